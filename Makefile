@@ -1,0 +1,47 @@
+# `make run` and `make test` are all a newcomer needs; both set up what they use, from the lock files.
+SHELL := /bin/bash
+PYTHON ?= python3
+SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
+HOST ?= 127.0.0.1
+PORT ?= 8000
+RECORDING ?=
+bin := .venv/bin
+
+.PHONY: run test lint bench lock clean
+
+run: .venv/.run
+	$(bin)/lidarcore serve --host $(HOST) --port $(PORT) $(if $(RECORDING),"$(RECORDING)")
+
+test: .venv/.dev lint
+	@command -v chromium >/dev/null || { $(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends chromium fonts-dejavu-core; }
+	$(bin)/python -m pytest
+
+lint: .venv/.dev
+	$(bin)/ruff check .
+	$(bin)/ruff format --check .
+	$(bin)/mypy
+
+bench: .venv/.run
+	$(bin)/lidarcore bench
+
+# Debian keeps venv in a package of its own.
+.venv/bin/python:
+	$(PYTHON) -m venv .venv || { $(SUDO) apt-get update && $(SUDO) apt-get install -y python3-venv && $(PYTHON) -m venv --clear .venv; }
+
+.venv/.run: requirements.lock pyproject.toml | .venv/bin/python
+	$(bin)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(bin)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+.venv/.dev: requirements-dev.lock .venv/.run
+	$(bin)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	@touch $@
+
+# After a change of the dependencies in pyproject.toml; needs uv.
+compile := uv pip compile --quiet --universal --generate-hashes --no-header --no-emit-index-url --no-annotate pyproject.toml
+lock:
+	$(compile) --group build -o requirements.lock
+	$(compile) --group build --group dev -c requirements.lock -o requirements-dev.lock
+
+clean:
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist
