@@ -1,0 +1,55 @@
+"""How the kernels are compiled, in one place."""
+
+import hashlib
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+# Sums may be reordered and fused, so that they vectorise; NaN and inf keep their meaning.
+_FAST = {"reassoc", "contract", "arcp", "nsz"}
+
+
+def kernel(function: Function) -> Function:
+    """Compile on first call, keep on disk, run without the GIL; division by zero gives inf or NaN as in numpy."""
+    return _compile(function, fastmath=_FAST)
+
+
+def inlined(function: Function) -> Function:
+    """The same for small kernels that others call: passing arrays costs more than short loops over them."""
+    return _compile(function, fastmath=_FAST, inline="always")
+
+
+def finite_kernel(function: Function) -> Function:
+    """The same for kernels that only ever see finite numbers: maxima vectorise too."""
+    return _compile(function, fastmath=_FAST | {"nnan", "ninf"})
+
+
+def _compile(function: Function, **options: Any) -> Function:
+    compiled: Function = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
+    return compiled
+
+
+def _use_own_cache() -> None:
+    """Keep compiled kernels in a folder named by a digest of this package's source.
+
+    Numba looks at the file of the outermost kernel only, and would go on using it after a kernel it calls changed.
+    Where the package's folder cannot be written, numba falls back to the user's cache by itself.
+    """
+    if "NUMBA_CACHE_DIR" in os.environ:
+        return
+    package = Path(__file__).parent
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(package.rglob("*.py")))).hexdigest()
+    folder = package / "__pycache__" / f"kernels-{digest[:16]}"
+    for stale in folder.parent.glob("kernels-*"):
+        if stale != folder:
+            shutil.rmtree(stale, ignore_errors=True)
+    numba.config.CACHE_DIR = str(folder)
+
+
+_use_own_cache()

@@ -1,0 +1,1 @@
+"""Measuring what extraction is worth, against simulated truth."""

@@ -1,0 +1,159 @@
+"""Which walls and corners of a known room are found, and how well: recall, precision, corner error."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarcore.extraction import extract
+from lidarcore.features import Features, Segments
+from lidarcore.noise import SensorNoise
+from lidarcore.scan import Array
+from lidarcore.settings import ExtractionSettings
+from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
+from lidarcore.simulation.world import Ints, World
+
+MIN_BEAMS, MIN_EXTENT = 8, 0.4  # a stretch of wall counts as visible from this many beams and metres on
+CORNER_RADIUS = 0.15  # a corner farther than this (m) from the true one is another
+
+
+@dataclass(slots=True)
+class Accuracy:
+    """Counts over many scans, and the figures made of them."""
+
+    visible: int = 0
+    found: int = 0
+    segments: int = 0
+    matched: int = 0
+    seam_walls: int = 0
+    seam_splits: int = 0
+    visible_corners: int = 0
+    corner_errors: list[float] = field(default_factory=list)
+
+    @property
+    def recall(self) -> float:
+        """Share of visible walls that a segment lies on."""
+        return self.found / self.visible
+
+    @property
+    def precision(self) -> float:
+        """Share of segments that lie on a wall."""
+        return self.matched / self.segments
+
+    @property
+    def corner_recall(self) -> float:
+        """Share of visible corners with a corner found within CORNER_RADIUS."""
+        return len(self.corner_errors) / self.visible_corners
+
+    @property
+    def corner_rms(self) -> float:
+        """Root mean square distance (m) of the found corners from the true ones."""
+        return float(np.sqrt(np.mean(np.square(self.corner_errors))))
+
+
+@dataclass(frozen=True, slots=True)
+class _View:
+    """A stretch of beams (n,) that meet one wall."""
+
+    wall: int
+    beams: Ints
+
+
+def measure_accuracy(sigma_range: float, scans: int, seed: int, fitter: str = "ml") -> Accuracy:
+    """Scans of the furnished room from random poses, against what can be seen in it.
+
+    sigma_range in m; the bearing noise is 0.001 rad. Both are told to the extraction, all else is default.
+    """
+    rng, world, result = np.random.default_rng(seed), furnished_room(), Accuracy()
+    sensor = SimulatedSensor(world, SensorNoise(sigma_range, 0.001))
+    settings = ExtractionSettings(fitter=fitter, noise=sensor.noise)
+    for _ in range(scans):
+        pose = random_pose(world, rng)
+        scan, hit = sensor.scan(pose, rng)
+        _count(result, world, pose, hit, extract(scan, settings), scan.bearings)
+    return result
+
+
+def _count(
+    result: Accuracy, world: World, pose: Array, hit: Ints, features: Features, bearings: Array
+) -> None:
+    walls = _in_sensor_frame(world.walls, pose)
+    segments = features.segments
+    tolerance = 0.03 + 3 * features.settings.noise.sigma_range
+    on_wall = _lies_on(segments.start, segments.end, walls, tolerance)
+    covered = _covered_beams(segments, len(hit))
+    result.segments += len(segments)
+    result.matched += int(on_wall.any(1).sum())
+    views = _views(walls, hit, bearings)
+    for view in views:
+        finders = covered[:, view.beams].sum(1) * 2 > len(view.beams)
+        result.visible += 1
+        result.found += int((finders & on_wall[:, view.wall]).any())
+        if {0, len(hit) - 1} <= set(view.beams):
+            result.seam_walls += 1
+            parts = on_wall[:, view.wall] & covered[:, view.beams].any(1)
+            result.seam_splits += int(parts.sum() > 1 and not (parts & covered[:, 0] & covered[:, -1]).any())
+    for corner in _visible_corners(walls, views, len(hit)):
+        result.visible_corners += 1
+        distances = np.linalg.norm(features.corners.xy - corner, axis=1)
+        if len(distances) and distances.min() < CORNER_RADIUS:
+            result.corner_errors.append(float(distances.min()))
+
+
+def _in_sensor_frame(walls: Array, pose: Array) -> Array:
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    moved: Array = (walls - pose[:2]) @ np.array([[c, -s], [s, c]])
+    return moved
+
+
+def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> NDArray[np.bool_]:
+    """(M, W) true where both ends of a segment are within tolerance of a wall, and its middle is on it."""
+    origin, along = walls[:, 0], walls[:, 1] - walls[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    tangent = along / length[:, None]
+    normal = np.stack([-tangent[:, 1], tangent[:, 0]], 1)
+    across = [np.abs(((p[:, None] - origin) * normal).sum(-1)) for p in (start, end)]
+    middle = (((start + end)[:, None] / 2 - origin) * tangent).sum(-1)
+    near: NDArray[np.bool_] = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
+    return near
+
+
+def _covered_beams(segments: Segments, beams: int) -> NDArray[np.bool_]:
+    """(M, N) true where a segment covers a beam."""
+    first, last = segments.first_beam[:, None], segments.last_beam[:, None]
+    k = np.arange(beams)
+    inside: NDArray[np.bool_] = np.where(
+        first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last)
+    )
+    return inside
+
+
+def _views(walls: Array, hit: Ints, bearings: Array) -> list[_View]:
+    """Each stretch of neighbouring beams that meet one wall, if it has enough beams and is long enough."""
+    starts = np.flatnonzero(hit != np.roll(hit, 1))
+    views = []
+    for start, stop in zip(starts, np.append(starts[1:], starts[:1] + len(hit)), strict=True):
+        beams = np.arange(start, stop) % len(hit)
+        wall = int(hit[start])
+        if wall >= 0 and len(beams) >= MIN_BEAMS and _extent(walls[wall], bearings[beams]) >= MIN_EXTENT:
+            views.append(_View(wall, beams))
+    return views
+
+
+def _extent(wall: Array, bearings: Array) -> float:
+    """Length (m) of the part of a wall between beams at these bearings."""
+    tangent = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])
+    normal = np.array([-tangent[1], tangent[0]])
+    u = np.stack([np.cos(bearings), np.sin(bearings)], 1)
+    return float(np.ptp((wall[0] @ normal) / (u @ normal) * (u @ tangent)))
+
+
+def _visible_corners(walls: Array, views: list[_View], beams: int) -> list[Array]:
+    """Ends that two walls share where their views are neighbours."""
+    corners = []
+    for view, other in zip(views, views[1:] + views[:1], strict=True):
+        if (view.beams[-1] + 1) % beams == other.beams[0]:
+            corners += [
+                p for p in walls[view.wall] for q in walls[other.wall] if np.allclose(p, q, atol=1e-9)
+            ]
+    return corners

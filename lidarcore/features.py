@@ -1,0 +1,220 @@
+"""What extraction found in one scan: segments, corners, and what it rejected and why.
+
+Each class is a view over one table written by the compiled kernel (a row for each thing found), so making it
+costs next to nothing; fields are cut from the table when they are asked for. All are in the sensor frame.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal, overload
+
+import numpy as np
+
+from lidarcore import tables
+from lidarcore.lines import STATUS_MESSAGES, Lines
+from lidarcore.scan import Array, Scan
+from lidarcore.segments import Ints
+from lidarcore.settings import Covariance, ExtractionSettings
+
+
+class _View:
+    """Rows of a kernel's table, and which of the two covariances `covariance` means."""
+
+    def __init__(self, table: Array, which: Covariance) -> None:
+        self._table = table
+        self._which = which
+
+    def __len__(self) -> int:
+        return len(self._table)
+
+    def _matrices(self, which: Covariance) -> Array:
+        column = 2 if which == "published" else 6
+        return self._table[:, column : column + 4].reshape(-1, 2, 2)
+
+
+class Segments(_View):
+    """M wall segments in the order of the ring."""
+
+    @cached_property
+    def lines(self) -> Lines:
+        """The fitted lines, with covariances of (alpha, r)."""
+        return Lines(
+            self._table[:, 0],
+            self._table[:, 1],
+            self._matrices("published"),
+            self._matrices("consistent"),
+            self._matrices(self._which),
+        )
+
+    @property
+    def start(self) -> Array:
+        """(M, 2) m, the first point projected on the line."""
+        return self._table[:, tables.START : tables.START + 2]
+
+    @property
+    def end(self) -> Array:
+        """(M, 2) m, the last point projected on the line."""
+        return self._table[:, tables.END : tables.END + 2]
+
+    @property
+    def length(self) -> Array:
+        """(M,) m."""
+        difference: Array = self.end - self.start
+        return np.hypot(difference[:, 0], difference[:, 1])
+
+    @property
+    def first_beam(self) -> Ints:
+        """(M,) index into the scan; a segment goes from first to last along the ring and may pass its end."""
+        return self._table[:, tables.FIRST_BEAM].astype(np.int64)
+
+    @property
+    def last_beam(self) -> Ints:
+        """(M,) index into the scan."""
+        return self._table[:, tables.LAST_BEAM].astype(np.int64)
+
+    @property
+    def n_points(self) -> Ints:
+        """(M,) number of returns between the two beams."""
+        return self._table[:, tables.N_POINTS].astype(np.int64)
+
+    @property
+    def rms(self) -> Array:
+        """(M,) m, root mean square distance of the fitted points from the line."""
+        return self._table[:, tables.RMS]
+
+
+class Corners(_View):
+    """K corners in the order of the ring."""
+
+    @property
+    def xy(self) -> Array:
+        """(K, 2) m."""
+        return self._table[:, :2]
+
+    @property
+    def covariance(self) -> Array:
+        """(K, 2, 2) m², the kind the settings ask for."""
+        return self._matrices(self._which)
+
+    @property
+    def covariance_published(self) -> Array:
+        """(K, 2, 2) m², from the lines' published covariances."""
+        return self._matrices("published")
+
+    @property
+    def covariance_consistent(self) -> Array:
+        """(K, 2, 2) m², from the lines' consistent covariances."""
+        return self._matrices("consistent")
+
+    @property
+    def sigma(self) -> Array:
+        """(K, 2) m, standard deviations of x and y from `covariance`."""
+        return np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    @property
+    def area(self) -> Array:
+        """(K,) m², of the one-sigma ellipse of `covariance`: pi times the root of its determinant."""
+        c = self.covariance
+        return np.pi * np.sqrt(np.maximum(c[:, 0, 0] * c[:, 1, 1] - c[:, 0, 1] * c[:, 1, 0], 0.0))
+
+    @property
+    def segments(self) -> Ints:
+        """(K, 2) indices of the two segments that meet, in the order of the ring."""
+        return self._table[:, tables.SEGMENTS : tables.SEGMENTS + 2].astype(np.int64)
+
+    @property
+    def angle(self) -> Array:
+        """(K,) rad between the two lines, in (0, pi/2]."""
+        return self._table[:, tables.ANGLE]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rejection:
+    """A piece that is no segment, or a pair of neighbours that makes no corner, and why."""
+
+    kind: Literal["segment", "corner"]
+    reason: str
+    message: str
+    first_beam: int
+    last_beam: int
+    xy: Array
+    value: float
+    limit: float
+
+
+class Rejections(_View, Sequence[Rejection]):
+    """All rejections of one scan, made readable when asked for."""
+
+    @overload
+    def __getitem__(self, i: int) -> Rejection: ...
+    @overload
+    def __getitem__(self, i: slice) -> list[Rejection]: ...
+    def __getitem__(self, i: int | slice) -> Rejection | list[Rejection]:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        row = self._table[i]
+        value, limit = float(row[5]), float(row[6])
+        kind, reason, text = _REASONS[int(row[0])]
+        found = STATUS_MESSAGES.get(int(value), "") if row[0] == tables.DEGENERATE else ""
+        message = text.format(
+            value=value, limit=limit, found=found, angle=_degrees(value), least=_degrees(limit)
+        )
+        return Rejection(kind, reason, message, int(row[1]), int(row[2]), row[3:5], value, limit)
+
+
+def _degrees(sine: float) -> float:
+    return float(np.degrees(np.arcsin(min(sine, 1.0))))
+
+
+_REASONS: dict[int, tuple[Literal["segment", "corner"], str, str]] = {
+    tables.TOO_FEW_POINTS: (
+        "segment",
+        "too few points",
+        "{value:.0f} points in one line; min_points asks for {limit:.0f}.",
+    ),
+    tables.TOO_SHORT: ("segment", "too short", "{value:.2f} m long; min_length asks for {limit:.2f} m."),
+    tables.DEGENERATE: ("segment", "no line", "The fitter gave no line: {found}."),
+    tables.TOO_FLAT: (
+        "corner",
+        "angle too small",
+        "{angle:.0f}° between the walls; corner_angle asks for {least:.0f}°.",
+    ),
+    tables.TOO_FAR: (
+        "corner",
+        "ends too far",
+        "The walls' lines meet {value:.2f} m beyond the end of one of them (occlusion or opening); "
+        "corner_gap allows {limit:.2f} m.",
+    ),
+}
+
+
+class Features:
+    """Segments, corners and rejections of one scan, by one fitter.
+
+    noise_seen (m) is a robust estimate of the ranges' standard deviation from this scan alone: far above the noise
+    in the settings, the covariances claim too much.
+    """
+
+    def __init__(
+        self,
+        scan: Scan,
+        settings: ExtractionSettings,
+        fitter: str,
+        segments: Array,
+        corners: Array,
+        rejections: Array,
+        noise_seen: float,
+    ) -> None:
+        self.scan = scan
+        self.settings = settings
+        self.fitter = fitter
+        self.segments = Segments(segments, settings.covariance)
+        self.corners = Corners(corners, settings.covariance)
+        self.rejections = Rejections(rejections, settings.covariance)
+        self.noise_seen = noise_seen
+
+    @property
+    def lines(self) -> Lines:
+        """The lines of the segments."""
+        return self.segments.lines

@@ -1,0 +1,59 @@
+"""A line in Hesse normal form, x cos(alpha) + y sin(alpha) = r, whichever fitter made it (MATH 2)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Line:
+    """One line in the sensor frame.
+
+    alpha                  rad, direction of the normal, in (-pi, pi]
+    r                      m, distance from the sensor, >= 0
+    covariance_published   (2, 2) of (alpha, r) in rad and m, by the formula of the fitter's paper
+    covariance_consistent  (2, 2), exact to first order under the noise model (MATH 3)
+    """
+
+    alpha: float
+    r: float
+    covariance_published: Array
+    covariance_consistent: Array
+
+    @property
+    def normal(self) -> Array:
+        """(2,) unit normal, pointing away from the sensor."""
+        return np.array([np.cos(self.alpha), np.sin(self.alpha)])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Lines:
+    """M lines in the sensor frame; the fields of `Line`, with a leading axis.
+
+    alpha (M,) rad, r (M,) m, covariance_published and covariance_consistent (M, 2, 2);
+    covariance is the one the settings ask for.
+    """
+
+    alpha: Array
+    r: Array
+    covariance_published: Array
+    covariance_consistent: Array
+    covariance: Array
+
+    def __len__(self) -> int:
+        return len(self.alpha)
+
+    def __getitem__(self, i: int) -> Line:
+        return Line(
+            float(self.alpha[i]),
+            float(self.r[i]),
+            self.covariance_published[i],
+            self.covariance_consistent[i],
+        )
+
+    def __iter__(self) -> Iterator[Line]:
+        return (self[i] for i in range(len(self)))

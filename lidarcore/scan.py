@@ -1,0 +1,102 @@
+"""One revolution of the sensor."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from lidarcore.errors import ScanError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """One scan in the sensor frame (x forward, y left, bearings counter-clockwise, REP-103).
+
+    Beams are kept in the order of the ring: bearings that grow with at most one wrap are kept as given,
+    any other order (clockwise, shuffled) is sorted by bearing. The arrays are read-only.
+
+    ranges      (N,) m; NaN where there was no return (inf and values <= 0 are turned into NaN)
+    bearings    (N,) rad, counter-clockwise from x
+    stamp       s, of the first beam; 0 if unknown
+    quality     (N,) as the sensor reports it, or None
+    beam_times  (N,) s after `stamp`, or None
+    odometry    (3,) x m, y m, heading rad: T_odom_sensor at `stamp`, or None
+
+    Raises ScanError if the arrays are empty, not of one length, or a bearing is not finite.
+    """
+
+    ranges: Array
+    bearings: Array
+    stamp: float = 0.0
+    quality: Array | None = None
+    beam_times: Array | None = None
+    odometry: Array | None = None
+
+    def __post_init__(self) -> None:
+        bearings = _row(self.bearings, "bearings")
+        ranges = _row(self.ranges, "ranges")
+        if not len(ranges):
+            raise ScanError("The scan is empty: give at least one beam.")
+        if not np.isfinite(bearings).all():
+            raise ScanError("A bearing is not a finite number: give every beam its angle in radians.")
+        if not np.isfinite(self.stamp):
+            raise ScanError(f"The stamp is {self.stamp}: give seconds, or 0 if unknown.")
+        with np.errstate(invalid="ignore"):
+            ranges = np.where((ranges > 0) & (ranges < np.inf), ranges, np.nan)
+        columns = {"ranges": ranges, "bearings": bearings}
+        columns |= {
+            name: _row(value, name)
+            for name in ("quality", "beam_times")
+            if (value := getattr(self, name)) is not None
+        }
+        for name, column in columns.items():
+            if len(column) != len(bearings):
+                raise ScanError(
+                    f"{name} has {len(column)} entries, bearings has {len(bearings)}: make them equal."
+                )
+        if not _follows_the_ring(bearings):
+            order = np.argsort(bearings % (2 * np.pi), kind="stable")
+            columns = {name: column[order] for name, column in columns.items()}
+        if self.odometry is not None:
+            pose = _row(self.odometry, "odometry")
+            if pose.shape != (3,) or not np.isfinite(pose).all():
+                raise ScanError(
+                    f"odometry is {self.odometry}: give x (m), y (m) and heading (rad), all finite."
+                )
+            columns["odometry"] = pose
+        for name, column in columns.items():
+            column.flags.writeable = False
+            object.__setattr__(self, name, column)
+
+    def __len__(self) -> int:
+        return len(self.ranges)
+
+    @cached_property
+    def valid(self) -> NDArray[np.bool_]:
+        """(N,) true where the beam returned."""
+        return ~np.isnan(self.ranges)
+
+    @cached_property
+    def xy(self) -> Array:
+        """(N, 2) m, sensor frame; NaN where there was no return."""
+        xy: Array = self.ranges[:, None] * np.stack([np.cos(self.bearings), np.sin(self.bearings)], -1)
+        return xy
+
+
+def _row(values: ArrayLike, name: str) -> Array:
+    """A private one-dimensional float copy of the values."""
+    row = np.array(values, np.float64)
+    if row.ndim != 1:
+        raise ScanError(f"{name} has shape {row.shape}: give one value for each beam, shape (N,).")
+    return row
+
+
+def _follows_the_ring(bearings: Array) -> bool:
+    """True if bearings grow all the way around, with at most one step back, and stay within one turn."""
+    steps_back = np.diff(bearings) < 0
+    wraps = int(steps_back.sum())
+    turn = bearings[-1] - bearings[0] + 2 * np.pi * wraps
+    return bool(wraps <= 1 and turn <= 2 * np.pi + 1e-9)

@@ -1,0 +1,63 @@
+"""What a user can set about extraction: declared once, with unit, range and meaning.
+
+Command line, REST, page and documentation derive from these declarations.
+"""
+
+from dataclasses import field
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+from pydantic.dataclasses import dataclass
+
+from lidarcore.lines import FITTERS
+from lidarcore.noise import SensorNoise
+
+Covariance = Literal["consistent", "published"]
+
+
+def _metres(low: float, high: float, text: str) -> object:
+    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": "m"})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExtractionSettings:
+    """How a scan becomes segments and corners. Metres and radians; immutable, so a scan never sees a half change.
+
+    Raises pydantic.ValidationError, a ValueError that names the field and its bounds.
+    """
+
+    fitter: Annotated[
+        str, Field(description="line fitting method", json_schema_extra={"enum": list(FITTERS)})
+    ] = "ml"
+    covariance: Annotated[Covariance, Field(description="which covariance `covariance` means")] = "consistent"
+    noise: SensorNoise = field(default_factory=SensorNoise)
+    split_threshold: Annotated[
+        float, _metres(0.005, 1.0, "a piece is split where a point is farther than this from its chord")
+    ] = 0.05
+    gap: Annotated[
+        float, _metres(0.02, 5.0, "neighbouring points farther apart than this are not connected")
+    ] = 0.3
+    min_points: Annotated[
+        int, Field(ge=2, le=1000, description="a segment needs at least this many points")
+    ] = 6
+    min_length: Annotated[float, _metres(0.0, 10.0, "a segment must be at least this long")] = 0.2
+    corner_angle: Annotated[
+        float,
+        Field(
+            ge=0.02,
+            le=1.57,
+            allow_inf_nan=False,
+            description="two walls make a corner if the angle between them is at least this",
+            json_schema_extra={"unit": "rad"},
+        ),
+    ] = 0.35
+    corner_gap: Annotated[
+        float, _metres(0.01, 2.0, "facing ends must be this close to each other and to the intersection")
+    ] = 0.2
+
+    @field_validator("fitter")
+    @classmethod
+    def _known_fitter(cls, name: str) -> str:
+        if name not in FITTERS:
+            raise ValueError(f"unknown fitter {name!r}: choose one of {', '.join(FITTERS)}")
+        return name

@@ -1,0 +1,34 @@
+"""The columns of the tables that kernels write and `Features` reads."""
+
+from lidarcore.compiled import inlined
+from lidarcore.lines import LINE_FIELDS
+from lidarcore.scan import Array
+
+# A segment: alpha, r, published (4), consistent (4), unit normal (2), then
+NORMAL = 10
+START, END = LINE_FIELDS, LINE_FIELDS + 2
+START_SPACING, END_SPACING = LINE_FIELDS + 4, LINE_FIELDS + 5
+FIRST_BEAM, LAST_BEAM, N_POINTS, RMS = LINE_FIELDS + 6, LINE_FIELDS + 7, LINE_FIELDS + 8, LINE_FIELDS + 9
+SEGMENT_FIELDS = LINE_FIELDS + 10
+
+# A corner: x, y, published (4), consistent (4), the two segments, the angle between them.
+SEGMENTS, ANGLE, CORNER_FIELDS = 10, 12, 13
+
+# A rejection: reason, first and last beam, x, y, the value found, the limit it missed.
+REJECTION_FIELDS = 7
+TOO_FEW_POINTS, TOO_SHORT, DEGENERATE, TOO_FLAT, TOO_FAR = range(5)
+
+
+@inlined
+def reject(
+    row: Array,
+    reason: int,
+    first_beam: float,
+    last_beam: float,
+    x: float,
+    y: float,
+    value: float,
+    limit: float,
+) -> None:
+    """Write one rejection."""
+    row[0], row[1], row[2], row[3], row[4], row[5], row[6] = reason, first_beam, last_beam, x, y, value, limit

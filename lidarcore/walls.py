@@ -1,0 +1,101 @@
+"""Pieces to wall segments: each fitted by the chosen method, or rejected with the reason."""
+
+import numpy as np
+
+from lidarcore.compiled import inlined
+from lidarcore.lines import fit_piece
+from lidarcore.lines.regression import OK
+from lidarcore.scan import Array
+from lidarcore.segments import Ints
+from lidarcore.tables import (
+    DEGENERATE,
+    END,
+    END_SPACING,
+    FIRST_BEAM,
+    LAST_BEAM,
+    N_POINTS,
+    NORMAL,
+    RMS,
+    START,
+    START_SPACING,
+    TOO_FEW_POINTS,
+    TOO_SHORT,
+    reject,
+)
+
+_TRIM_FROM = 8  # pieces with fewer points keep their end points
+
+
+@inlined
+def fit_pieces(
+    points: Array,
+    beams: Ints,
+    first: Ints,
+    last: Ints,
+    fitter: int,
+    v_rho: float,
+    v_theta: float,
+    min_points: float,
+    min_length: float,
+    w: Array,
+    segments: Array,
+    rejections: Array,
+) -> tuple[int, int]:
+    """Write a row for each accepted segment and each rejected piece; their numbers. w is scratch."""
+    n_segments = n_rejections = 0
+    for p in range(len(first)):
+        a, b = first[p], last[p]
+        row = segments[n_segments]
+        row[FIRST_BEAM], row[LAST_BEAM], row[N_POINTS] = beams[a], beams[b], b - a + 1
+        middle = (a + b) // 2
+        x, y = points[0, middle] * points[1, middle], points[0, middle] * points[2, middle]
+        reason, value, limit = -1, 0.0, 0.0
+        if row[N_POINTS] < min_points:
+            reason, value, limit = TOO_FEW_POINTS, row[N_POINTS], min_points
+        else:
+            # The end points may belong to a neighbour or to both (mixed pixels): they do not take part in the fit.
+            trim = 1 if row[N_POINTS] >= _TRIM_FROM else 0
+            inside = slice(a + trim, b + 1 - trim)
+            rho, c, s = points[0, inside], points[1, inside], points[2, inside]
+            status = fit_piece(fitter, rho, c, s, v_rho, v_theta, w[inside], row)
+            if status != OK:
+                reason, value = DEGENERATE, status
+            else:
+                length = _measure_extent(points, a, b, trim, row)
+                if length < min_length:
+                    reason, value, limit = TOO_SHORT, length, min_length
+        if reason < 0:
+            n_segments += 1
+        else:
+            reject(rejections[n_rejections], reason, beams[a], beams[b], x, y, value, limit)
+            n_rejections += 1
+    return n_segments, n_rejections
+
+
+@inlined
+def _measure_extent(points: Array, a: int, b: int, trim: int, row: Array) -> float:
+    """End points on the line, spacing of the points at both ends and residual, into the row; the length."""
+    nx, ny, r = row[NORMAL], row[NORMAL + 1], row[1]
+    inside = slice(a + trim, b + 1 - trim)
+    row[RMS] = _rms(points[0, inside], points[1, inside], points[2, inside], nx, ny, r)
+    start, end = _along(points, a, nx, ny), _along(points, b, nx, ny)
+    row[START], row[START + 1] = r * nx - start * ny, r * ny + start * nx
+    row[END], row[END + 1] = r * nx - end * ny, r * ny + end * nx
+    row[START_SPACING] = np.abs(_along(points, a + 1, nx, ny) - start)
+    row[END_SPACING] = np.abs(_along(points, b - 1, nx, ny) - end)
+    return np.abs(end - start)
+
+
+@inlined
+def _along(points: Array, i: int, nx: float, ny: float) -> float:
+    """Coordinate of a point along the line."""
+    return points[0, i] * (nx * points[2, i] - ny * points[1, i])
+
+
+@inlined
+def _rms(rho: Array, c: Array, s: Array, nx: float, ny: float, r: float) -> float:
+    squares = 0.0
+    for i in range(len(rho)):
+        e = rho[i] * (nx * c[i] + ny * s[i]) - r
+        squares += e * e
+    return np.sqrt(squares / len(rho))
