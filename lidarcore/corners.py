@@ -5,13 +5,18 @@ import numpy as np
 from lidarcore.compiled import inlined
 from lidarcore.scan import Array
 from lidarcore.tables import (
-    ANGLE,
+    CORNER_CONSISTENT,
+    CORNER_PUBLISHED,
+    DISTANCE,
     END,
     END_SPACING,
     FIRST_BEAM,
     LAST_BEAM,
+    LINE_CONSISTENT,
+    LINE_PUBLISHED,
     NORMAL,
     SEGMENTS,
+    SINE,
     START,
     START_SPACING,
     TOO_FAR,
@@ -54,7 +59,7 @@ def find_corners(
         beyond = max(
             _distance(row, first, END) - first[END_SPACING],
             _distance(row, second, START) - second[START_SPACING],
-        ) - _SIGMAS * np.sqrt(row[6] + row[9])  # fmt: skip
+        ) - _SIGMAS * np.sqrt(row[CORNER_CONSISTENT] + row[CORNER_CONSISTENT + 3])  # fmt: skip
         if beyond > corner_gap:
             reject(
                 rejections[n_rejections], TOO_FAR, first[LAST_BEAM], second[FIRST_BEAM],
@@ -62,7 +67,7 @@ def find_corners(
             )  # fmt: skip
             n_rejections += 1
             continue
-        row[SEGMENTS], row[SEGMENTS + 1], row[ANGLE] = j, k, np.arcsin(min(sine, 1.0))
+        row[SEGMENTS], row[SEGMENTS + 1], row[SINE] = j, k, sine
         n_corners += 1
     return n_corners, n_rejections
 
@@ -75,20 +80,21 @@ def _distance(corner: Array, segment: Array, end: int) -> float:
 
 @inlined
 def intersect(first: Array, second: Array, out: Array) -> None:
-    """Intersect two lines given as rows alpha, r, published (4), consistent (4), unit normal (2).
+    """Intersect two lines given as rows unit normal (2), r, published (4), consistent (4).
 
     Writes x, y and both covariances (10 numbers) to out. One code path for every fitter: to first order
     the result does not depend on the parameters a line was fitted in.
     """
     cj, sj, ck, sk = first[NORMAL], first[NORMAL + 1], second[NORMAL], second[NORMAL + 1]
     d = sk * cj - ck * sj
-    x, y = (first[1] * sk - second[1] * sj) / d, (second[1] * cj - first[1] * ck) / d
+    rj, rk = first[DISTANCE], second[DISTANCE]
+    x, y = (rj * sk - rk * sj) / d, (rk * cj - rj * ck) / d
     out[0], out[1] = x, y
     # n_j . p = r_j gives n_j . dp = dr_j - (t_j . p) dalpha_j =: e_j; dp follows from e as p from r.
     tj, tk = cj * y - sj * x, ck * y - sk * x
-    for o in (2, 6):
-        vj = first[o + 3] - 2 * tj * first[o + 1] + tj * tj * first[o]
-        vk = second[o + 3] - 2 * tk * second[o + 1] + tk * tk * second[o]
+    for i, o in ((LINE_PUBLISHED, CORNER_PUBLISHED), (LINE_CONSISTENT, CORNER_CONSISTENT)):
+        vj = first[i + 3] - 2 * tj * first[i + 1] + tj * tj * first[i]
+        vk = second[i + 3] - 2 * tk * second[i + 1] + tk * tk * second[i]
         out[o] = (sk * sk * vj + sj * sj * vk) / (d * d)
         out[o + 1] = out[o + 2] = -(sk * ck * vj + sj * cj * vk) / (d * d)
         out[o + 3] = (ck * ck * vj + cj * cj * vk) / (d * d)

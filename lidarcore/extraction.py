@@ -1,7 +1,7 @@
 """From a scan to segments and corners: the algorithm on one screen."""
 
 import threading
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from lidarcore.polar import unit_vectors
 from lidarcore.scan import Array, Scan
 from lidarcore.segments import Ints, compact, find_pieces, noise_seen
 from lidarcore.settings import ExtractionSettings
-from lidarcore.tables import CORNER_FIELDS, REJECTION_FIELDS, SEGMENT_FIELDS
+from lidarcore.tables import FIELDS
 from lidarcore.walls import fit_pieces
 
 Parameters = tuple[float, float, float, float, float, float, float, float]
@@ -32,13 +32,17 @@ def compare(
     settings, names = settings or ExtractionSettings(), tuple(fitters)
     buffers = _buffers.of(len(scan))
     ids = np.array([FITTER_IDS[name] for name in names])
-    segments, corners, rejections, counts, seen = _extract(
-        scan.ranges, scan.bearings, ids, _parameters(settings), *buffers
-    )
+    tables, counts, seen = _extract(scan.ranges, scan.bearings, ids, _parameters(settings), *buffers)
     return {
-        name: Features(scan, settings, name, segments[f, :s], corners[f, :c], rejections[f, :r], seen)
-        for f, (name, (s, c, r)) in enumerate(zip(names, counts.tolist(), strict=True))
+        name: Features(scan, settings, name, table, count, seen)
+        for name, table, count in zip(names, tables, counts.tolist(), strict=True)
     }
+
+
+def compiled_call(beams: int, settings: ExtractionSettings) -> Callable[[Array, Array, Ints], object]:
+    """The compiled call alone, for scans of this many beams: what `compare` wraps in Python objects."""
+    parameters, buffers = _parameters(settings), _buffers.of(beams)
+    return lambda ranges, bearings, fitters: _extract(ranges, bearings, fitters, parameters, *buffers)
 
 
 def warm_up() -> None:
@@ -66,25 +70,31 @@ def _parameters(settings: ExtractionSettings) -> Parameters:
 @kernel
 def _extract(
     ranges: Array, bearings: Array, fitters: Ints, parameters: Parameters, floats: Array, indices: Ints
-) -> tuple[Array, Array, Array, Ints, float]:
-    """For each fitter f: rows of segments[f], corners[f] and rejections[f], and how many in counts[f]; noise seen."""
+) -> tuple[Array, Ints, float]:
+    """For each fitter a table of segments, corners and rejections, the numbers of each, and the noise seen.
+
+    With P pieces a table has rows 0 ... P for segments, P ... 2 P for corners, 2 P ... 4 P for rejections.
+    """
     v_rho, v_theta, _, _, min_points, min_length, sin_angle, corner_gap = parameters
     points, weights, beams = floats[:3], floats[3], indices[0]
     first, last, seen = _segment(ranges, bearings, parameters, points, beams, weights, indices[1:])
-    segments = np.empty((len(fitters), len(first), SEGMENT_FIELDS))
-    corners = np.empty((len(fitters), len(first), CORNER_FIELDS))
-    rejections = np.empty((len(fitters), 2 * len(first), REJECTION_FIELDS))
-    counts = np.empty((len(fitters), 3), np.int64)
+    pieces = len(first)
+    tables, counts = np.empty((len(fitters), 4 * pieces, FIELDS)), np.empty((len(fitters), 3), np.int64)
     for f in range(len(fitters)):
+        segments, corners, rejections = (
+            tables[f, :pieces],
+            tables[f, pieces : 2 * pieces],
+            tables[f, 2 * pieces :],
+        )
         found, rejected = fit_pieces(
             points, beams, first, last, fitters[f], v_rho, v_theta, min_points, min_length, weights,
-            segments[f], rejections[f],
+            segments, rejections,
         )  # fmt: skip
         counts[f, 0] = found
         counts[f, 1], counts[f, 2] = find_corners(
-            segments[f], found, sin_angle, corner_gap, corners[f], rejections[f], rejected
+            segments, found, sin_angle, corner_gap, corners, rejections, rejected
         )
-    return segments, corners, rejections, counts, seen
+    return tables, counts, seen
 
 
 @inlined

@@ -13,6 +13,7 @@ import numpy as np
 
 from lidarcore import tables
 from lidarcore.lines import STATUS_MESSAGES, Lines
+from lidarcore.lines.line import normal_angle
 from lidarcore.scan import Array, Scan
 from lidarcore.segments import Ints
 from lidarcore.settings import Covariance, ExtractionSettings
@@ -28,8 +29,7 @@ class _View:
     def __len__(self) -> int:
         return len(self._table)
 
-    def _matrices(self, which: Covariance) -> Array:
-        column = 2 if which == "published" else 6
+    def _matrices(self, column: int) -> Array:
         return self._table[:, column : column + 4].reshape(-1, 2, 2)
 
 
@@ -39,12 +39,13 @@ class Segments(_View):
     @cached_property
     def lines(self) -> Lines:
         """The fitted lines, with covariances of (alpha, r)."""
+        published, consistent = (self._matrices(c) for c in (tables.LINE_PUBLISHED, tables.LINE_CONSISTENT))
         return Lines(
-            self._table[:, 0],
-            self._table[:, 1],
-            self._matrices("published"),
-            self._matrices("consistent"),
-            self._matrices(self._which),
+            normal_angle(self._table[:, tables.NORMAL], self._table[:, tables.NORMAL + 1]),
+            self._table[:, tables.DISTANCE],
+            published,
+            consistent,
+            published if self._which == "published" else consistent,
         )
 
     @property
@@ -95,17 +96,17 @@ class Corners(_View):
     @property
     def covariance(self) -> Array:
         """(K, 2, 2) m², the kind the settings ask for."""
-        return self._matrices(self._which)
+        return self.covariance_published if self._which == "published" else self.covariance_consistent
 
     @property
     def covariance_published(self) -> Array:
         """(K, 2, 2) m², from the lines' published covariances."""
-        return self._matrices("published")
+        return self._matrices(tables.CORNER_PUBLISHED)
 
     @property
     def covariance_consistent(self) -> Array:
         """(K, 2, 2) m², from the lines' consistent covariances."""
-        return self._matrices("consistent")
+        return self._matrices(tables.CORNER_CONSISTENT)
 
     @property
     def sigma(self) -> Array:
@@ -126,7 +127,7 @@ class Corners(_View):
     @property
     def angle(self) -> Array:
         """(K,) rad between the two lines, in (0, pi/2]."""
-        return self._table[:, tables.ANGLE]
+        return np.arcsin(np.minimum(self._table[:, tables.SINE], 1.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,17 +202,17 @@ class Features:
         scan: Scan,
         settings: ExtractionSettings,
         fitter: str,
-        segments: Array,
-        corners: Array,
-        rejections: Array,
+        table: Array,
+        counts: tuple[int, int, int],
         noise_seen: float,
     ) -> None:
         self.scan = scan
         self.settings = settings
         self.fitter = fitter
-        self.segments = Segments(segments, settings.covariance)
-        self.corners = Corners(corners, settings.covariance)
-        self.rejections = Rejections(rejections, settings.covariance)
+        pieces, (n, k, m) = len(table) // 4, counts
+        self.segments = Segments(table[:n], settings.covariance)
+        self.corners = Corners(table[pieces : pieces + k], settings.covariance)
+        self.rejections = Rejections(table[2 * pieces : 2 * pieces + m], settings.covariance)
         self.noise_seen = noise_seen
 
     @property

@@ -9,6 +9,7 @@ from lidarcore.scan import Array
 from lidarcore.segments import Ints
 from lidarcore.tables import (
     DEGENERATE,
+    DISTANCE,
     END,
     END_SPACING,
     FIRST_BEAM,
@@ -75,7 +76,7 @@ def fit_pieces(
 @inlined
 def _measure_extent(points: Array, a: int, b: int, trim: int, row: Array) -> float:
     """End points on the line, spacing of the points at both ends and residual, into the row; the length."""
-    nx, ny, r = row[NORMAL], row[NORMAL + 1], row[1]
+    nx, ny, r = row[NORMAL], row[NORMAL + 1], row[DISTANCE]
     inside = slice(a + trim, b + 1 - trim)
     row[RMS] = _rms(points[0, inside], points[1, inside], points[2, inside], nx, ny, r)
     start, end = _along(points, a, nx, ny), _along(points, b, nx, ny)

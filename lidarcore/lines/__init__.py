@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike
 from lidarcore.compiled import inlined, kernel
 from lidarcore.errors import DegenerateLineError, ScanError
 from lidarcore.lines import arras_siegwart, cwlf, ml, tls
-from lidarcore.lines.line import Array, Line, Lines
+from lidarcore.lines.line import Array, Line, Lines, normal_angle
 from lidarcore.lines.regression import NO_DIRECTION, NOT_FINITE, OK, THROUGH_SENSOR
 from lidarcore.noise import SensorNoise
 from lidarcore.polar import unit_vectors
 
 __all__ = ["FITTERS", "FITTER_IDS", "LINE_FIELDS", "STATUS_MESSAGES", "Fitter", "Line", "Lines", "fit_piece"]
 
-LINE_FIELDS = 12  # alpha, r, published (4), consistent (4), unit normal (2)
+LINE_FIELDS = 11  # unit normal (2), r, published (4), consistent (4)
 
 STATUS_MESSAGES = {
     NO_DIRECTION: "the points coincide or have no direction",
@@ -67,21 +67,23 @@ class Fitter:
         if len(rho) < 2:
             raise DegenerateLineError(f"{len(rho)} point(s) do not determine a line: give at least 2.")
         out = np.empty(LINE_FIELDS)
-        status = _fit_beams(
+        status = fit_beams(
             FITTER_IDS[self.name], rho, theta, noise.sigma_range**2, noise.sigma_bearing**2, out
         )
         if status == _BAD_BEAM:
             raise ScanError("Ranges must be positive and finite, bearings finite: leave missing returns out.")
         if status != OK:
             raise DegenerateLineError(f"{self.name}: {STATUS_MESSAGES[status]}.")
-        return Line(float(out[0]), float(out[1]), out[2:6].reshape(2, 2), out[6:10].reshape(2, 2))
+        alpha = float(normal_angle(out[0], out[1]))
+        return Line(alpha, float(out[2]), out[3:7].reshape(2, 2), out[7:].reshape(2, 2))
 
 
 _BAD_BEAM = 100
 
 
 @kernel
-def _fit_beams(fitter: int, rho: Array, theta: Array, v_rho: float, v_theta: float, out: Array) -> int:
+def fit_beams(fitter: int, rho: Array, theta: Array, v_rho: float, v_theta: float, out: Array) -> int:
+    """Check the beams and fit them: the compiled call behind `Fitter.fit`."""
     for i in range(len(rho)):
         if not (rho[i] > 0 and rho[i] < np.inf and np.abs(theta[i]) < 1e5):
             return _BAD_BEAM

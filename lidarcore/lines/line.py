@@ -4,9 +4,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+
+
+def normal_angle(nx: ArrayLike, ny: ArrayLike) -> Array:
+    """Angle (rad) of a normal, in (-pi, pi]."""
+    alpha = np.arctan2(ny, nx)
+    return np.where(alpha > -np.pi, alpha, np.pi)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

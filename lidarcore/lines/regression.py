@@ -124,15 +124,12 @@ def store(
     normal: tuple[float, float, float],
     published: Sym2,
 ) -> int:
-    """Write a line with r >= 0 to out: alpha, r, the published and the consistent covariance, the unit normal."""
+    """Write a line with r >= 0 to out: unit normal, r, and the published and consistent covariances of (alpha, r)."""
     nx, ny, r = normal
-    alpha = np.arctan2(ny, nx)
-    out[0] = alpha if alpha > -np.pi else np.pi
-    out[1] = r
+    out[0], out[1], out[2] = nx, ny, r
     consistent = consistent_covariance(w, rho, c, s, v_rho, v_theta, nx, ny)
-    out[2], out[3], out[4], out[5] = published[0], published[1], published[1], published[2]
-    out[6], out[7], out[8], out[9] = consistent[0], consistent[1], consistent[1], consistent[2]
-    out[10], out[11] = nx, ny
+    out[3], out[4], out[5], out[6] = published[0], published[1], published[1], published[2]
+    out[7], out[8], out[9], out[10] = consistent[0], consistent[1], consistent[1], consistent[2]
     # Both covariances positive definite; NaN and inf fail one of the comparisons.
     good = (
         published[0] > 0

@@ -1,0 +1,104 @@
+"""`lidarcore bench`: speed, accuracy and server load on this machine, beside the figures they should reach."""
+
+import platform
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from app.load import measure_load
+from lidarcore.evaluation.accuracy import measure_accuracy
+from lidarcore.evaluation.speed import Timing, time_extraction, time_fits, time_growth
+from lidarcore.extraction import warm_up
+
+SCANS, SEED = 400, 2026
+# Noise (m): least recall and precision of walls.
+ACCURACY = {0.01: (0.995, 0.999), 0.02: (0.99, 0.99), 0.03: (0.99, 0.985), 0.05: (0.99, 0.97)}
+CORNER_RECALL, CORNER_RMS = 0.985, {0.01: 0.009}
+LOAD_SECONDS = 15.0
+
+
+def run() -> None:
+    """Measure and print everything; takes about a minute and a half."""
+    console = Console()
+    warm_up()
+    console.print(f"{_processor()}, Python {platform.python_version()}, numpy {np.__version__}\n")
+    extraction = time_extraction()
+    console.print(_timings("Extraction: 920 beams, 9 x 8 m room of 36 wall pieces, 1 cm noise", extraction))
+    ratio = extraction[-3 - 1].median / extraction[0].median
+    console.print(
+        f"Compiled call (ml, with trigonometry of its own) against the yardstick: {ratio:.2f} times (at most 1.4)\n"
+    )
+    console.print(_timings("One line through 100 points, both covariances", time_fits()))
+    console.print(_timings("More beams (extract)", time_growth()))
+    console.print(_accuracy())
+    console.print(_load())
+
+
+def _processor() -> str:
+    """The processor's name where the system tells it."""
+    try:
+        with open("/proc/cpuinfo") as file:
+            return next(line.split(":", 1)[1].strip() for line in file if line.startswith("model name"))
+    except (OSError, StopIteration):
+        return platform.processor() or platform.machine()
+
+
+def _timings(title: str, rows: Sequence[Timing]) -> Table:
+    table = _table(title, "", "best us", "median us", "at most")
+    for row in rows:
+        limit = "" if row.limit is None else _judged(f"{row.limit:g}", row.median <= row.limit)
+        table.add_row(row.what, f"{row.best:.2f}", f"{row.median:.2f}", limit)
+    return table
+
+
+def _accuracy() -> Table:
+    table = _table(
+        f"Walls and corners of the room from {SCANS} random poses, default settings",
+        "noise", "recall", "precision", "corner recall", "corner RMS mm", "splits at the seam",
+    )  # fmt: skip
+    for sigma, (recall, precision) in ACCURACY.items():
+        found = measure_accuracy(sigma, SCANS, SEED)
+        rms = f"{1e3 * found.corner_rms:.1f}"
+        limit = CORNER_RMS.get(sigma)
+        table.add_row(
+            f"{100 * sigma:.0f} cm",
+            _judged(f"{found.recall:.4f}", found.recall >= recall),
+            _judged(f"{found.precision:.4f}", found.precision >= precision),
+            _judged(f"{found.corner_recall:.4f}", found.corner_recall >= CORNER_RECALL),
+            rms if limit is None else _judged(rms, found.corner_rms <= limit),
+            _judged(f"{found.seam_splits} of {found.seam_walls}", found.seam_splits == 0),
+        )
+    return table
+
+
+def _load() -> Table:
+    table = _table(
+        f"Server at 10 Hz, {LOAD_SECONDS:.0f} s, the simulated room",
+        "browsers", "CPU % of a core", "frames/s", "age ms p50", "age ms p99", "frames behind", "memory",
+    )  # fmt: skip
+    for clients, most in ((1, 10.0), (20, None)):
+        load = measure_load(clients, LOAD_SECONDS)
+        cpu = f"{load.cpu_percent:.1f}"
+        table.add_row(
+            str(clients),
+            cpu if most is None else _judged(cpu, load.cpu_percent <= most),
+            f"{load.rate_hz:.1f}",
+            f"{np.percentile(load.age_ms, 50):.1f}",
+            f"{np.percentile(load.age_ms, 99):.1f}",
+            _judged(str(load.lag), load.lag <= 1),
+            f"{load.memory_growth / 1e6:+.1f} MB",
+        )
+    return table
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left")
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="right" if i else "left")
+    return table
+
+
+def _judged(text: str, good: bool) -> str:
+    return f"{text} [green]ok[/]" if good else f"{text} [red]missed[/]"
