@@ -36,7 +36,7 @@ def _compile(function: Function, **options: Any) -> Function:
 
 
 def _use_own_cache() -> None:
-    """Keep compiled kernels in a folder named by a digest of this package's source.
+    """Keep compiled kernels in a folder named by a digest of their sources.
 
     Numba looks at the file of the outermost kernel only, and would go on using it after a kernel it calls changed.
     Where the package's folder cannot be written, numba falls back to the user's cache by itself.
@@ -44,8 +44,9 @@ def _use_own_cache() -> None:
     if "NUMBA_CACHE_DIR" in os.environ:
         return
     package = Path(__file__).parent
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(package.rglob("*.py")))).hexdigest()
-    folder = package / "__pycache__" / f"kernels-{digest[:16]}"
+    sources = (path.read_bytes() for path in sorted(package.rglob("*.py")))
+    digest = hashlib.sha256(b"".join(source for source in sources if b"lidarcore.compiled" in source))
+    folder = package / "__pycache__" / f"kernels-{digest.hexdigest()[:16]}"
     for stale in folder.parent.glob("kernels-*"):
         if stale != folder:
             shutil.rmtree(stale, ignore_errors=True)

@@ -12,7 +12,14 @@ from lidarcore.compiled import inlined, kernel
 from lidarcore.errors import DegenerateLineError, ScanError
 from lidarcore.lines import arras_siegwart, cwlf, ml, tls
 from lidarcore.lines.line import Array, Line, Lines, normal_angle
-from lidarcore.lines.regression import NO_DIRECTION, NOT_FINITE, OK, THROUGH_SENSOR
+from lidarcore.lines.regression import (
+    NO_DIRECTION,
+    NOT_FINITE,
+    OK,
+    THROUGH_SENSOR,
+    consistent_covariance,
+    store,
+)
 from lidarcore.noise import SensorNoise
 from lidarcore.polar import unit_vectors
 
@@ -33,16 +40,20 @@ def fit_piece(
 ) -> int:
     """Fit one piece with the fitter of the given number; w (N,) is scratch, out (LINE_FIELDS,) the result."""
     if fitter == 0:
-        return arras_siegwart.fit(rho, c, s, v_rho, v_theta, w, out)
-    if fitter == 1:
-        return cwlf.fit(rho, c, s, v_rho, v_theta, w, out)
-    if fitter == 2:
-        return tls.fit_utls(rho, c, s, v_rho, v_theta, w, out)
-    if fitter == 3:
-        return tls.fit_wtls(rho, c, s, v_rho, v_theta, w, out)
-    if fitter == 4:
-        return tls.fit_wctls(rho, c, s, v_rho, v_theta, w, out)
-    return ml.fit(rho, c, s, v_rho, v_theta, w, out)
+        status, normal, published = arras_siegwart.fit(rho, c, s, v_rho, v_theta, w)
+    elif fitter == 1:
+        status, normal, published = cwlf.fit(rho, c, s, v_rho, v_theta, w)
+    elif fitter == 2:
+        status, normal, published = tls.fit_utls(rho, c, s, v_rho, v_theta, w)
+    elif fitter == 3:
+        status, normal, published = tls.fit_wtls(rho, c, s, v_rho, v_theta, w)
+    elif fitter == 4:
+        status, normal, published = tls.fit_wctls(rho, c, s, v_rho, v_theta, w)
+    else:
+        status, normal, published = ml.fit(rho, c, s, v_rho, v_theta, w)
+    if status != OK:
+        return status
+    return store(out, normal, published, consistent_covariance(w, rho, c, s, v_rho, v_theta, normal))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,29 +3,28 @@
 from lidarcore.compiled import inlined
 from lidarcore.lines.line import Array
 from lidarcore.lines.regression import (
+    NO_LINE,
     OK,
+    Fit,
     Moments,
     Sym2,
     moments,
-    store,
     total_least_squares,
     weights_determinant,
 )
 
 
 @inlined
-def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, out: Array) -> int:
+def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
     """Fit one piece; the double sums of [17] factor into moments, so the cost is O(N)."""
     weights_determinant(w, rho)
     m = moments(w, rho, c, s)
     status, nx, ny, r = total_least_squares(m)
     if status != OK:
-        return status
+        return status, NO_LINE, NO_LINE
     if r < 0:
         nx, ny, r = -nx, -ny, -r
-    return store(
-        out, w, rho, c, s, v_rho, v_theta, (nx, ny, r), _published(w, rho, c, s, v_rho, v_theta, m, nx, ny)
-    )
+    return OK, (nx, ny, r), _published(w, rho, c, s, v_rho, v_theta, m, nx, ny)
 
 
 @inlined

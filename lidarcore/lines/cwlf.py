@@ -4,15 +4,41 @@ import numpy as np
 
 from lidarcore.compiled import inlined
 from lidarcore.lines.line import Array
-from lidarcore.lines.regression import NO_DIRECTION, moments, store
+from lidarcore.lines.regression import NO_DIRECTION, NO_LINE, OK, Fit, moments
 
 
 @inlined
-def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, out: Array) -> int:
-    """Regress y on x where x spreads more (N_1 >= N_2 [20, 21]), else x on y: the same with the axes swapped."""
-    if _x_spreads_more(rho, c, s):
-        return _regress(rho, c, s, v_rho, v_theta, w, out, False)
-    return _regress(rho, s, c, v_rho, v_theta, w, out, True)
+def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
+    """y = slope (x - x_mean) + b with inverse conditional variances of y given x as weights [22-32].
+
+    Where y spreads more (N_1 < N_2 [20, 21]) it is x on y [33-35]: the same with the axes swapped.
+    """
+    swapped = not _x_spreads_more(rho, c, s)
+    if swapped:
+        c, s = s, c
+    for i in range(len(rho)):
+        w[i] = c[i] * c[i] / (v_theta * rho[i] * rho[i]) + s[i] * s[i] / v_rho  # [23], [34]
+    w_sum, x_mean, b, xx, xy, _ = moments(w, rho, c, s)
+    if not xx > 1e-24 * (x_mean * x_mean + b * b):
+        return NO_DIRECTION, NO_LINE, NO_LINE
+    slope = xy / xx  # [29]
+    v_slope, v_b = 1 / (w_sum * xx), 1 / w_sum  # [31], [32], uncorrelated
+    # To normal form: n = (-slope, 1) / h, r = (b - slope x_mean) / h, h = |(slope, 1)|.
+    h = np.sqrt(1 + slope * slope)
+    nx, ny, r = -slope / h, 1 / h, (b - slope * x_mean) / h
+    alpha_slope = 1 / (h * h)
+    r_slope = -x_mean / h - r * slope / (h * h)
+    r_b = 1 / h
+    if r < 0:
+        nx, ny, r, r_slope, r_b = -nx, -ny, -r, -r_slope, -r_b
+    if swapped:  # a reflection: the angle runs the other way
+        nx, ny, alpha_slope = ny, nx, -alpha_slope
+    published = (
+        alpha_slope * alpha_slope * v_slope,
+        alpha_slope * r_slope * v_slope,
+        r_slope * r_slope * v_slope + r_b * r_b * v_b,
+    )
+    return OK, (nx, ny, r), published
 
 
 @inlined
@@ -27,37 +53,3 @@ def _x_spreads_more(rho: Array, c: Array, s: Array) -> bool:
         xx += x * x
         yy += y * y
     return len(rho) * xx - x_sum * x_sum >= len(rho) * yy - y_sum * y_sum
-
-
-@inlined
-def _regress(
-    rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, out: Array, swapped: bool
-) -> int:
-    """y = slope (x - x_mean) + b with inverse conditional variances of y given x as weights [22-32].
-
-    With c and s swapped this is x on y [33-35].
-    """
-    for i in range(len(rho)):
-        w[i] = c[i] * c[i] / (v_theta * rho[i] * rho[i]) + s[i] * s[i] / v_rho  # [23], [34]
-    w_sum, x_mean, b, xx, xy, _ = moments(w, rho, c, s)
-    if not xx > 1e-24 * (x_mean * x_mean + b * b):
-        return NO_DIRECTION
-    slope = xy / xx  # [29]
-    v_slope, v_b = 1 / (w_sum * xx), 1 / w_sum  # [31], [32], uncorrelated
-    # To normal form: n = (-slope, 1) / h, r = (b - slope x_mean) / h, h = |(slope, 1)|.
-    h = np.sqrt(1 + slope * slope)
-    nx, ny, r = -slope / h, 1 / h, (b - slope * x_mean) / h
-    alpha_slope = 1 / (h * h)
-    r_slope = -x_mean / h - r * slope / (h * h)
-    r_b = 1 / h
-    if r < 0:
-        nx, ny, r, r_slope, r_b = -nx, -ny, -r, -r_slope, -r_b
-    if swapped:  # a reflection: the angle runs the other way
-        nx, ny, alpha_slope = ny, nx, -alpha_slope
-        c, s = s, c
-    published = (
-        alpha_slope * alpha_slope * v_slope,
-        alpha_slope * r_slope * v_slope,
-        r_slope * r_slope * v_slope + r_b * r_b * v_b,
-    )
-    return store(out, w, rho, c, s, v_rho, v_theta, (nx, ny, r), published)

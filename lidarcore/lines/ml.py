@@ -8,7 +8,7 @@ import numpy as np
 
 from lidarcore.compiled import inlined
 from lidarcore.lines.line import Array
-from lidarcore.lines.regression import NOT_FINITE, OK, THROUGH_SENSOR, Sym2, store
+from lidarcore.lines.regression import NO_LINE, NOT_FINITE, OK, THROUGH_SENSOR, Fit, Normal, Sym2
 
 _STEPS = 12
 _CONVERGED = (
@@ -17,7 +17,7 @@ _CONVERGED = (
 
 
 @inlined
-def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, out: Array) -> int:
+def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
     """Gauss-Newton on rho_i - 1 / (q . u_i), the variances evaluated at the fit, not at the noisy point."""
     # Start: inverse range is linear in q; weights rho² make it the least-squares line a'x + b'y = 1 (utls).
     xx = xy = yy = bx = by = 0.0
@@ -30,21 +30,20 @@ def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, 
         by += y
     det = xx * yy - xy * xy
     if not det > 1e-13 * xx * yy:
-        return THROUGH_SENSOR
+        return THROUGH_SENSOR, NO_LINE, NO_LINE
     qx, qy = (yy * bx - xy * by) / det, (xx * by - xy * bx) / det
     for _ in range(_STEPS):
         status, dx, dy = _step(rho, c, s, v_rho, v_theta, qx, qy)
         if status != OK:
-            return status
+            return status, NO_LINE, NO_LINE
         qx, qy = qx + dx, qy + dy
         if dx * dx + dy * dy < _CONVERGED * (qx * qx + qy * qy):
             break
     else:
-        return NOT_FINITE
+        return NOT_FINITE, NO_LINE, NO_LINE
     q = np.sqrt(qx * qx + qy * qy)
     normal = (qx / q, qy / q, 1 / q)
-    published = _information_inverse(rho, c, s, v_rho, v_theta, normal, w)
-    return store(out, w, rho, c, s, v_rho, v_theta, normal, published)
+    return OK, normal, _information_inverse(rho, c, s, v_rho, v_theta, normal, w)
 
 
 @inlined
@@ -71,7 +70,7 @@ def _step(
 
 @inlined
 def _information_inverse(
-    rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: tuple[float, float, float], w: Array
+    rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: Normal, w: Array
 ) -> Sym2:
     """Covariance of (alpha, r): inverse Fisher information at the fit, where the beams meet the line.
 

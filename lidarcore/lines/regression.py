@@ -14,6 +14,10 @@ OK, NO_DIRECTION, THROUGH_SENSOR, NOT_FINITE = 0, 1, 2, 3
 
 Moments = tuple[float, float, float, float, float, float]
 Sym2 = tuple[float, float, float]  # xx, xy, yy of a symmetric 2 x 2 matrix
+Normal = tuple[float, float, float]  # unit normal and distance r >= 0 of a line
+Fit = tuple[int, Normal, Sym2]  # status, line, published covariance of (alpha, r); the weights are left in w
+
+NO_LINE = (0.0, 0.0, 0.0)
 
 
 @inlined
@@ -45,16 +49,6 @@ def weights_determinant(w: Array, rho: Array) -> None:
 
 
 @inlined
-def weights_effective(
-    w: Array, rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, nx: float, ny: float
-) -> None:
-    """Inverse effective variance of the distance to a line with unit normal (nx, ny) (MATH 1)."""
-    for i in range(len(rho)):
-        across, along = nx * c[i] + ny * s[i], ny * c[i] - nx * s[i]
-        w[i] = 1 / (v_rho * across * across + v_theta * (rho[i] * along) ** 2)
-
-
-@inlined
 def total_least_squares(m: Moments) -> tuple[int, float, float, float]:
     """Status, unit normal and signed distance of the line with least squared normal distances."""
     _, x, y, xx, xy, yy = m
@@ -74,14 +68,15 @@ def total_least_squares(m: Moments) -> tuple[int, float, float, float]:
 
 @inlined
 def consistent_covariance(
-    w: Array, rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, nx: float, ny: float
+    w: Array, rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: Normal
 ) -> Sym2:
-    """Sandwich covariance of (alpha, r) for a regression with weights w, normal (nx, ny) with r >= 0 (MATH 3).
+    """Sandwich covariance of (alpha, r) for a regression with weights w (MATH 3).
 
     To first order every fitter here minimises sum w (e + dalpha t - dr)², e the distance of a point from the line
     and t its coordinate along it; they differ by w only. With A the normal matrix and B the same sum
     weighted by w² v, v the effective variance, the covariance is A^-1 B A^-1.
     """
+    nx, ny, _ = normal
     a0 = a1 = a2 = b0 = b1 = b2 = 0.0
     middle = len(rho) // 2
     t0 = rho[middle] * (nx * s[middle] - ny * c[middle])
@@ -113,29 +108,17 @@ def consistent_covariance(
 
 
 @inlined
-def store(
-    out: Array,
-    w: Array,
-    rho: Array,
-    c: Array,
-    s: Array,
-    v_rho: float,
-    v_theta: float,
-    normal: tuple[float, float, float],
-    published: Sym2,
-) -> int:
-    """Write a line with r >= 0 to out: unit normal, r, and the published and consistent covariances of (alpha, r)."""
-    nx, ny, r = normal
-    out[0], out[1], out[2] = nx, ny, r
-    consistent = consistent_covariance(w, rho, c, s, v_rho, v_theta, nx, ny)
+def store(out: Array, normal: Normal, published: Sym2, consistent: Sym2) -> int:
+    """Write a line to out: unit normal, r, and both covariances of (alpha, r); NOT_FINITE if one is not positive."""
+    out[0], out[1], out[2] = normal
     out[3], out[4], out[5], out[6] = published[0], published[1], published[1], published[2]
     out[7], out[8], out[9], out[10] = consistent[0], consistent[1], consistent[1], consistent[2]
-    # Both covariances positive definite; NaN and inf fail one of the comparisons.
+    # NaN and inf fail one of the comparisons.
     good = (
         published[0] > 0
         and consistent[0] > 0
         and np.inf > published[0] * published[2] > published[1] * published[1]
         and np.inf > consistent[0] * consistent[2] > consistent[1] * consistent[1]
-        and r < np.inf
+        and normal[2] < np.inf
     )
     return OK if good else NOT_FINITE

@@ -8,46 +8,53 @@ import numpy as np
 
 from lidarcore.compiled import inlined
 from lidarcore.lines.line import Array
-from lidarcore.lines.regression import OK, THROUGH_SENSOR, Moments, Sym2, moments, store, weights_determinant
+from lidarcore.lines.regression import (
+    NO_LINE,
+    OK,
+    THROUGH_SENSOR,
+    Fit,
+    Moments,
+    Normal,
+    Sym2,
+    moments,
+    weights_determinant,
+)
 
 
 @inlined
-def fit_utls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, out: Array) -> int:
+def fit_utls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
     """Unweighted [WCTLS 1-7]."""
     w[:] = 1.0
     m = moments(w, rho, c, s)
     status, abc, normal = _implicit(m)
     if status != OK:
-        return status
-    published = _propagate(w, rho, c, s, v_rho, v_theta, m, abc, False)
-    return store(out, w, rho, c, s, v_rho, v_theta, normal, published)
+        return status, NO_LINE, NO_LINE
+    return OK, normal, _propagate(w, rho, c, s, v_rho, v_theta, m, abc, False)
 
 
 @inlined
-def fit_wtls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, out: Array) -> int:
+def fit_wtls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
     """Weighted [WCTLS 8-15]."""
     weights_determinant(w, rho)
     m = moments(w, rho, c, s)
     status, abc, normal = _implicit(m)
     if status != OK:
-        return status
-    published = _propagate(w, rho, c, s, v_rho, v_theta, m, abc, True)
-    return store(out, w, rho, c, s, v_rho, v_theta, normal, published)
+        return status, NO_LINE, NO_LINE
+    return OK, normal, _propagate(w, rho, c, s, v_rho, v_theta, m, abc, True)
 
 
 @inlined
-def fit_wctls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, out: Array) -> int:
+def fit_wctls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
     """Weighted conformal [WCTLS 16-23]: Q = (a/c, b/c), normal Q/|Q|, distance 1/|Q|."""
     weights_determinant(w, rho)
     status, _, normal = _implicit(moments(w, rho, c, s))
     if status != OK:
-        return status
-    published = _conformal(rho, c, s, v_rho, v_theta, normal)
-    return store(out, w, rho, c, s, v_rho, v_theta, normal, published)
+        return status, NO_LINE, NO_LINE
+    return OK, normal, _conformal(rho, c, s, v_rho, v_theta, normal)
 
 
 @inlined
-def _implicit(m: Moments) -> tuple[int, tuple[float, float, float], tuple[float, float, float]]:
+def _implicit(m: Moments) -> tuple[int, tuple[float, float, float], Normal]:
     """a, b, c of [2-4, 10-12] divided by the squared sum of weights, and the normal form.
 
     In centred moments a = X S_yy - Y S_xy has the same value as with raw ones, without their cancellation.
@@ -58,7 +65,7 @@ def _implicit(m: Moments) -> tuple[int, tuple[float, float, float], tuple[float,
     h = np.sqrt(a * a + b * b)
     r = -c / h
     if not r * r > 1e-14 * (x * x + y * y + xx + yy):  # also when a = b = 0: NaN
-        return THROUGH_SENSOR, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        return THROUGH_SENSOR, NO_LINE, NO_LINE
     return OK, (a, b, c), (a / h, b / h, r)
 
 
@@ -113,9 +120,7 @@ def _propagate(
 
 
 @inlined
-def _conformal(
-    rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: tuple[float, float, float]
-) -> Sym2:
+def _conformal(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: Normal) -> Sym2:
     """C_Q = (sum p p^T / (|Q|² vc))^-1 through the Jacobian [23]; vc the conditional variance 1 / (n^T C^-1 n).
 
     Reconstructed: the paper takes C_Q from an earlier one and does not print it (MATH 2.4). Written in the frame

@@ -1,0 +1,63 @@
+"""Recorded scans: `open_recording` recognises the format by content; FORMATS lists what it knows.
+
+A format is one module of this package with one subclass of Recording; it is found by being there.
+"""
+
+import inspect
+import os
+import pkgutil
+from importlib import import_module
+from pathlib import Path
+
+from lidarcore.errors import RecordingError
+from lidarcore.recordings.base import Recording
+from lidarcore.recordings.streams import read_head
+
+__all__ = ["FORMATS", "Recording", "open_recording"]
+
+
+def _formats() -> tuple[type[Recording], ...]:
+    """Every concrete Recording in this package, by name."""
+    modules = [import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
+    found = {
+        value
+        for module in modules
+        for _, value in inspect.getmembers(module, inspect.isclass)
+        if issubclass(value, Recording) and not inspect.isabstract(value)
+    }
+    return tuple(sorted(found, key=lambda format_: format_.name))
+
+
+FORMATS: tuple[type[Recording], ...] = _formats()
+
+
+def open_recording(path: str | os.PathLike[str], topic: str | None = None) -> Recording:
+    """Open a recording of any known format, also packed with gzip or zstd. Content decides, not the name.
+
+    `topic` chooses one of several lidars in the file.
+    Raises RecordingError if the path is no readable recording of a known format, and its subclass TopicError
+    (with `topics`) if the file holds several lidars and none was chosen, or not the one asked for.
+    """
+    path = Path(path)
+    try:
+        head = _head(path)
+        recognised = [format_ for format_ in FORMATS if format_.recognises(path, head)]
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
+        raise RecordingError(f"{path} cannot be opened: {error}.") from error
+    if recognised:
+        return recognised[0](path, topic)
+    if path.is_dir():
+        raise RecordingError(f"The directory {path.name} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
+    known = ", ".join(format_.name for format_ in FORMATS)
+    raise RecordingError(f"{path.name} is none of the known formats: {known}. It begins with {head[:24]!r}.")
+
+
+def _head(path: Path) -> bytes:
+    if path.is_dir():
+        return b""
+    if not path.is_file():
+        raise RecordingError(f"There is no file {path}: give the path of a recording.")
+    head = read_head(path)
+    if not head:
+        raise RecordingError(f"{path.name} is empty.")
+    return head

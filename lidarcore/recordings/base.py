@@ -1,0 +1,126 @@
+"""What every recording offers, whatever its format."""
+
+import re
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from io import BufferedReader
+from pathlib import Path
+from typing import ClassVar
+
+from lidarcore.errors import LidarError, RecordingError, ScanError, TopicError
+from lidarcore.recordings.streams import MAX_RECORD, MEBIBYTE, available, open_stream
+from lidarcore.scan import Array, Scan
+
+NOMINAL_PERIOD = 0.1
+"""s between scans where a file does not say: the usual 10 Hz of a small lidar."""
+
+
+class Recording(ABC):
+    """Scans from a file, read lazily and as often as wanted: `for scan in recording`.
+
+    name            of the format
+    path            of the file or directory
+    topics          the lidars in the file, where the format names them; topic: the one that is read
+    T_base_sensor   (3,) x m, y m, yaw rad of the sensor in the robot's base frame; None if the file has none
+
+    Iterating raises RecordingError if the file holds no scan or turns out hostile. What can be saved of a
+    damaged or truncated file is yielded, and `notes` say so. Iterate in one place at a time: an iteration
+    starts the counts in `notes` anew.
+
+    A format is a module of this package with a concrete subclass: `name`, `signature`, `_open`, `_scans`.
+    """
+
+    name: ClassVar[str]
+    signature: ClassVar[re.Pattern[bytes]]
+    """Found in the beginning of every file of the format, and of no other."""
+
+    def __init__(self, path: Path, topic: str | None = None) -> None:
+        self.path = path
+        self.topics: tuple[str, ...] = ()
+        self.topic: str | None = None
+        self.T_base_sensor: Array | None = None
+        self._remarks: dict[str, None] = {}
+        self._counts: Counter[str] = Counter()
+        with self._guard():
+            self._open(topic)
+
+    @classmethod
+    def recognises(cls, path: Path, head: bytes) -> bool:
+        """Say whether the file is of this format; `head` is its beginning, unpacked; a directory has none."""
+        return cls.signature.search(head) is not None
+
+    @abstractmethod
+    def _open(self, topic: str | None) -> None:
+        """Find out what the file holds, and call `_choose`."""
+
+    @abstractmethod
+    def _scans(self) -> Iterator[Callable[[], Scan]]:
+        """Yield what makes each scan: one that turns out damaged is then counted and left out."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Plain sentences on what was found and handled; the counts in them grow during an iteration."""
+        return (*self._remarks, *(f"{count} {what}." for what, count in self._counts.items()))
+
+    def __iter__(self) -> Iterator[Scan]:
+        self._counts.clear()
+        empty = True
+        with self._guard():
+            for make_scan in self._scans():
+                try:
+                    scan = make_scan()
+                except ScanError as error:
+                    self._count(f"damaged scans left out ({error})", 1)
+                else:
+                    empty = False
+                    yield scan
+        if empty:
+            raise self._error("holds no readable scan.")
+
+    def _choose(self, topics: Iterable[str], topic: str | None) -> None:
+        """Settle on the topic to read: the one asked for, or the only one. A format without topics has ()."""
+        self.topics = tuple(sorted(topics))
+        listed = " or ".join(self.topics) or "none, the format has no topics"
+        if topic is None and len(self.topics) <= 1:
+            self.topic = next(iter(self.topics), None)
+        elif topic is None:
+            raise TopicError(f"{self.path.name} holds several lidars: choose {listed}.", self.topics)
+        elif topic in self.topics:
+            self.topic = topic
+        else:
+            raise TopicError(f"{self.path.name} has no lidar {topic!r}: choose {listed}.", self.topics)
+
+    def _remark(self, sentence: str) -> None:
+        self._remarks[sentence] = None
+
+    def _count(self, what: str, number: int) -> None:
+        if number:
+            self._counts[what] += number
+
+    def _error(self, trouble: str) -> RecordingError:
+        """Make an error that also tells what was noted so far."""
+        return RecordingError(" ".join([f"{self.path.name} {trouble}", *self.notes]))
+
+    def _stream(self) -> BufferedReader:
+        return open_stream(self.path, self._remark)
+
+    def _content(self) -> bytes:
+        """Read the whole file, for the formats that cannot be read piece by piece."""
+        with self._stream() as stream:
+            content = available(stream, MAX_RECORD)
+            if stream.read(1):
+                raise self._error(f"is larger than {MAX_RECORD // MEBIBYTE} MiB, too large for {self.name}.")
+        return content
+
+    @contextmanager
+    def _guard(self) -> Iterator[None]:
+        """Turn whatever a decoder raises on a broken or hostile file into a RecordingError."""
+        try:
+            yield
+        except LidarError:
+            raise
+        except Exception as error:
+            reason = f"{type(error).__name__}: {error}".rstrip(": ")
+            raise self._error(f"cannot be read as {self.name} ({reason}).") from error

@@ -1,0 +1,138 @@
+"""What the line-based laser logs share: the geometry of a SICK, markers for no return, stamps."""
+
+from abc import abstractmethod
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
+from lidarcore.recordings.streams import lines
+from lidarcore.scan import Array, Scan
+
+SICK_RANGE = 80.0
+"""m that a SICK LMS reaches; 81.83 to 81.91 are its error codes."""
+
+SICK_STEPS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
+"""Degrees between the beams of a SICK LMS by their number (CARMEN, carmen_laser_guess_angle_increment)."""
+
+
+class Reading(NamedTuple):
+    """One laser line: ranges (N,) m, no return from max_range m on; bearings (N,) rad, None if as of a SICK.
+
+    stamps are candidates in s, best first; pose and base_pose (3,) are of the sensor and of the robot.
+    """
+
+    topic: str
+    ranges: Array
+    bearings: Array | None
+    max_range: float
+    stamps: tuple[float, ...]
+    pose: Array | None = None
+    base_pose: Array | None = None
+    quality: Array | None = None
+
+
+def numbers(words: list[bytes], count: int) -> Array:
+    """Read the first `count` words as numbers (count,). Raises ValueError if they are not there."""
+    if not 0 <= count <= len(words):
+        raise ValueError(f"{count} numbers announced, {len(words)} found")
+    return np.array([float(word) for word in words[:count]], np.float64)
+
+
+def sick_bearings(number: int) -> Array:
+    """Bearings (number,) rad of a SICK LMS, from the right: 180 degrees, or 100 with 400 or 401 beams.
+
+    Any other number of beams is taken to span 180 degrees, as CARMEN does.
+    """
+    start = -50.0 if number in (400, 401) else -90.0
+    step = SICK_STEPS.get(number, 180 / max(number - 1, 1))
+    return np.deg2rad(start + step * np.arange(number, dtype=np.float64))
+
+
+class LaserLog(Recording):
+    """A text log with one line for each scan.
+
+    Opening reads the file once: for the lidars in it, the marker for no return and the quality of the stamps.
+    """
+
+    @abstractmethod
+    def _parse(self, words: list[bytes]) -> Reading | None:
+        """Read a line; None if it is not a laser's. Raises ValueError or IndexError if it is damaged."""
+
+    def _open(self, topic: str | None) -> None:
+        readings: defaultdict[str, list[Reading]] = defaultdict(list)
+        for reading in self._readings():
+            readings[reading.topic].append(reading)
+        if not readings:
+            raise self._error("holds no readable laser line.")
+        self._choose(self._distinct(set(readings)), topic)
+        self._survey(readings[str(self.topic)])
+
+    def _distinct(self, topics: set[str]) -> set[str]:
+        """Topics without those that repeat another one."""
+        return topics
+
+    def _survey(self, readings: list[Reading]) -> None:
+        """Learn from all readings of the chosen lidar what a single one does not say."""
+        beams = {len(reading.ranges) for reading in readings if reading.bearings is None}
+        if unknown := beams - SICK_STEPS.keys():
+            self._remark(f"The log gives no angles: {max(unknown)} beams are taken to span 180 degrees.")
+        self._marker = self._find_marker(np.concatenate([reading.ranges for reading in readings]))
+        self._stamps = self._settle_stamps(np.array([reading.stamps for reading in readings]))
+
+    def _readings(self) -> Iterator[Reading]:
+        with self._stream() as stream:
+            for line in lines(stream, self._remark):
+                try:
+                    reading = self._parse(line.split())
+                except (ValueError, IndexError):
+                    self._count("damaged lines left out", 1)
+                else:
+                    if reading is not None:
+                        yield reading
+
+    def _find_marker(self, ranges: Array) -> float:
+        """Reading in m from which on there was no return.
+
+        Some logs hold a clipped value (50.0, 51.15) for it. That is the largest reading, and it occurs more
+        often than all others of the last metre together, which true ranges do not.
+        """
+        below = ranges[ranges < SICK_RANGE]
+        largest = float(below.max(initial=0))
+        ties, last_metre = int(np.sum(below == largest)), int(np.sum(below > largest - 1))
+        if ties < 10 or 2 * ties <= last_metre:
+            return SICK_RANGE
+        self._remark(f"{ties} readings are exactly {largest:.6g} m, the largest: taken to mean no return.")
+        return largest
+
+    def _settle_stamps(self, candidates: Array) -> Array:
+        """Stamps (N,) s: the first column of candidates (N, kinds) that mostly grows, or file order."""
+        for stamps in candidates.T:
+            steps = np.diff(stamps)
+            if np.isfinite(stamps).all() and stamps.any() and (len(steps) == 0 or np.median(steps) > 0):
+                if backward := int(np.sum(steps < 0)):
+                    self._remark(f"The stamps go back in time {backward} times.")
+                return np.array(stamps, np.float64)
+        self._remark(
+            f"The stamps are zero or rounded: scans are taken in file order, {NOMINAL_PERIOD} s apart."
+        )
+        return NOMINAL_PERIOD * np.arange(len(candidates), dtype=np.float64)
+
+    def _scans(self) -> Iterator[Callable[[], Scan]]:
+        chosen = (reading for reading in self._readings() if reading.topic == self.topic)
+        for reading, stamp in zip(chosen, self._stamps, strict=False):
+            yield partial(self._scan, reading, float(stamp))
+
+    def _scan(self, reading: Reading, stamp: float) -> Scan:
+        missing = reading.ranges >= min(self._marker, reading.max_range)
+        self._count("readings at or beyond the largest range taken as missing", int(missing.sum()))
+        ranges = np.where(missing, np.nan, reading.ranges)
+        bearings = sick_bearings(len(ranges)) if reading.bearings is None else reading.bearings
+        return Scan(ranges, bearings, stamp, reading.quality, odometry=self._odometry(reading, stamp))
+
+    def _odometry(self, reading: Reading, stamp: float) -> Array | None:
+        """T_odom_sensor (3,) of a reading."""
+        return reading.pose

@@ -1,0 +1,49 @@
+"""Text that SLAMTEC's tools write: frame_grabber's saved scans and ultra_simple's print-out."""
+
+import re
+from collections.abc import Iterator
+
+from lidarcore.recordings.revolutions import Revolution, RplidarRecording
+from lidarcore.recordings.streams import lines
+
+NUMBER = rb"([-+]?\d+(?:\.\d*)?)"
+PRINTED = re.compile(rb"theta: *%b +Dist: *%b +Q: *%b" % (NUMBER, NUMBER, NUMBER))
+SAVED = re.compile(rb"^\s*%b\s+%b\s+%b\s*$" % (NUMBER, NUMBER, NUMBER))
+ANNOUNCED = re.compile(rb"^#COUNT=(\d{1,9})")
+
+STEP_BACK = 30.0
+"""deg: the tools sort each revolution by angle, so the next one begins where the angle falls back.
+
+The S of ultra_simple marks the sample that opened the revolution, which once sorted may be the last."""
+
+
+class SlamtecDump(RplidarRecording):
+    """A text of one or several revolutions: "angle distance quality", or "theta: .. Dist: .. Q: ..".
+
+    Lines that are neither, like the device's serial number, are skipped.
+    """
+
+    name = "SLAMTEC text dump"
+    signature = re.compile(rb"\A\s*#RPLIDAR SCAN DATA|%b" % PRINTED.pattern)
+
+    def _revolutions(self) -> Iterator[Revolution]:
+        revolution: Revolution = []
+        for sample in self._samples():
+            if revolution and sample[0] < revolution[-1][0] - STEP_BACK:
+                yield revolution
+                revolution = []
+            revolution.append(sample)
+        if revolution:
+            yield revolution
+
+    def _samples(self) -> Iterator[tuple[float, ...]]:
+        announced = found = 0
+        with self._stream() as stream:
+            for line in lines(stream, self._remark):
+                if sample := PRINTED.search(line) or SAVED.match(line):
+                    found += 1
+                    yield tuple(map(float, sample.groups()))
+                elif header := ANNOUNCED.match(line):
+                    announced += int(header[1])
+        if announced and announced != found:
+            self._remark(f"The headers announce {announced} samples, {found} are there.")
