@@ -1,0 +1,137 @@
+import gzip
+import json
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lidarcore.errors import RecordingError, TopicError
+from lidarcore.recordings import FORMATS, open_recording
+from lidarcore.recordings.streams import read_head
+
+RECORDINGS = {
+    "ccny_hokuyo_rosbag1/demo.bag": "ROS 1 bag",
+    "rplidar_rosbag1/lidar.bag": "ROS 1 bag",
+    "turtlebot4_rplidar_rosbag2/macfirst_floor_take_2": "ROS 2 bag",
+    "turtlebot4_rplidar_rosbag2/macfirst_floor_take_2/macfirst_floor_take_2_0.db3": "ROS 2 bag",
+    "carmen_radish_corrected/aces-corrected.log.gz": "CARMEN log",
+    "carmen_radish_corrected/belgioioso-corrected.log.gz": "CARMEN log",
+    "carmen_radish_corrected/freiburg-101-corrected.log.gz": "CARMEN log",
+    "carmen_radish_corrected/intel-corrected.log.gz": "CARMEN log",
+    "rplidar_csv_rooms/golf_room.csv.gz": "RPLIDAR CSV",
+    "rplidar_csv_rooms/mapping_keng.csv.gz": "RPLIDAR CSV",
+    "rplidar_csv_rooms/nut_behind_obj.csv.gz": "RPLIDAR CSV",
+    "rplidar_csv_rooms/nut_room.csv.gz": "RPLIDAR CSV",
+    "rplidar_raw_serial_hex/frame_grabber_Data.txt": "SLAMTEC text dump",
+    "windsor_rplidar_mat/scans_a.mat": "MATLAB .mat",
+    "windsor_rplidar_mat/scans_b.mat": "MATLAB .mat",
+    "tau_rplidar_c1_rooms/lab446__scans.json": "JSON point sets",
+    "tau_rplidar_c1_rooms/lab446__scans.old.json": "JSON point sets",
+    "intel_odometry_groundtruth/intel_scans_odom_corrected.csv.gz": "CSV table of scans",
+    "mrpt_sena_sick/localization_demo.csv.gz": "CSV table of scans",
+    "mrpt_sena_sick/sena_telecom_one_loop.csv.gz": "CSV table of scans",
+}
+
+
+def test_every_file_is_of_one_format_or_none(data):
+    paths = [path for path in data.rglob("*") if path.is_file()] + [data / name for name in RECORDINGS]
+    for path in paths:
+        head = b"" if path.is_dir() else read_head(path)
+        found = [format_.name for format_ in FORMATS if format_.recognises(path, head)]
+        expected = RECORDINGS.get(str(path.relative_to(data)))
+        assert found == ([expected] if expected else []), path
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+def test_every_recording_yields_the_same_sound_scans_each_time(data, name):
+    topic = "dev1" if name.endswith(".json") else None
+    recording = open_recording(data / name, topic)
+    first = list(recording)
+    notes = recording.notes
+    again = list(recording)
+    assert len(first) == len(again) > 0
+    assert recording.notes == notes
+    for scan, other in zip(first, again, strict=True):
+        np.testing.assert_array_equal(scan.ranges, other.ranges)
+        assert np.isfinite(scan.bearings).all()
+        assert np.isfinite(scan.stamp)
+        assert not (scan.ranges <= 0).any()
+        assert not np.isinf(scan.ranges).any()
+
+
+def test_content_decides_not_the_name(data, tmp_path):
+    renamed = tmp_path / "scan.txt"
+    shutil.copy(data / "rplidar_rosbag1/lidar.bag", renamed)
+    assert open_recording(renamed).name == "ROS 1 bag"
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in RECORDINGS if "rosbag2" not in name and not name.endswith("gz")]
+)
+def test_packed_files_read_as_the_unpacked(data, tmp_path, name):
+    packed = tmp_path / "packed"
+    packed.write_bytes(gzip.compress((data / name).read_bytes(), 1))
+    topic = "dev1" if name.endswith(".json") else None
+    for scan, other in zip(open_recording(packed, topic), open_recording(data / name, topic), strict=True):
+        np.testing.assert_array_equal(scan.ranges, other.ranges)
+        np.testing.assert_array_equal(scan.bearings, other.bearings)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda folder: folder / "missing.bag", "There is no file"),
+        (lambda folder: folder / "zero\0byte", "There is no file"),
+        (lambda folder: folder / ("long" * 200), "cannot be opened"),
+        (lambda folder: folder, "is not a ROS 2 bag"),
+        (lambda folder: Path("/dev/zero"), "There is no file"),
+        (lambda folder: written(folder / "empty.bag", b""), "is empty"),
+        (lambda folder: written(folder / "unpacks_to_nothing.gz", gzip.compress(b"")), "is empty"),
+        (lambda folder: written(folder / "letter.txt", b"Dear robot,\n"), "none of the known formats"),
+        (lambda folder: fifo(folder / "pipe"), "There is no file"),
+    ],
+)
+def test_what_is_no_recording_gets_a_clear_error(tmp_path, make, text):
+    with pytest.raises(RecordingError, match=text):
+        open_recording(make(tmp_path))
+
+
+def written(path: Path, content: bytes) -> Path:
+    path.write_bytes(content)
+    return path
+
+
+def fifo(path: Path) -> Path:
+    os.mkfifo(path)
+    return path
+
+
+def test_the_error_for_an_unknown_file_lists_the_formats(tmp_path):
+    with pytest.raises(RecordingError) as caught:
+        open_recording(written(tmp_path / "letter.txt", b"Dear robot,\n"))
+    assert all(format_.name in str(caught.value) for format_ in FORMATS)
+
+
+def test_of_several_lidars_one_must_be_chosen(data):
+    path = data / "tau_rplidar_c1_rooms/lab446__scans.json"
+    with pytest.raises(TopicError) as caught:
+        open_recording(path)
+    assert caught.value.topics == ("dev1", "dev2", "dev3", "dev4", "dev5")
+    assert open_recording(path, "dev3").topic == "dev3"
+    with pytest.raises(TopicError, match="dev9"):
+        open_recording(path, "dev9")
+
+
+def test_a_topic_is_refused_where_there_are_none(data):
+    with pytest.raises(TopicError, match="no topics"):
+        open_recording(data / "windsor_rplidar_mat/scans_a.mat", "/scan")
+
+
+def test_point_sets_keep_their_points(data):
+    path = data / "tau_rplidar_c1_rooms/lab446__scans.json"
+    points = np.array(json.loads(path.read_text())["dev2"])
+    (scan,) = open_recording(path, "dev2")
+    found, expected = (np.array(sorted(map(tuple, xy))) for xy in (scan.xy, points))
+    np.testing.assert_allclose(found, expected, atol=1e-12)
