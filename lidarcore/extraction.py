@@ -10,8 +10,8 @@ from lidarcore.corners import find_corners
 from lidarcore.features import Features
 from lidarcore.lines import FITTER_IDS, FITTERS
 from lidarcore.polar import unit_vectors
-from lidarcore.scan import Array, Scan
-from lidarcore.segments import Ints, compact, find_pieces, noise_seen
+from lidarcore.scan import Array, Ints, Scan
+from lidarcore.segmentation import compact, find_pieces, noise_seen
 from lidarcore.settings import ExtractionSettings
 from lidarcore.tables import FIELDS
 from lidarcore.walls import fit_pieces

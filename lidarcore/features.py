@@ -14,8 +14,7 @@ import numpy as np
 from lidarcore import tables
 from lidarcore.lines import STATUS_MESSAGES, Lines
 from lidarcore.lines.line import normal_angle
-from lidarcore.scan import Array, Scan
-from lidarcore.segments import Ints
+from lidarcore.scan import Array, Ints, Scan
 from lidarcore.settings import Covariance, ExtractionSettings
 
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from lidarcore.errors import ScanError
 
 Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)

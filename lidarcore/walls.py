@@ -5,8 +5,7 @@ import numpy as np
 from lidarcore.compiled import inlined
 from lidarcore.lines import fit_piece
 from lidarcore.lines.regression import OK
-from lidarcore.scan import Array
-from lidarcore.segments import Ints
+from lidarcore.scan import Array, Ints
 from lidarcore.tables import (
     DEGENERATE,
     DISTANCE,

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from lidarcore.extraction import extract
 from lidarcore.features import Features, Segments
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
+from lidarcore.scan import Array, Ints
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
-from lidarcore.simulation.world import Ints, World
+from lidarcore.simulation.world import World
 
 MIN_BEAMS, MIN_EXTENT = 8, 0.4  # a stretch of wall counts as visible from this many beams and metres on
 CORNER_RADIUS = 0.15  # a corner farther than this (m) from the true one is another

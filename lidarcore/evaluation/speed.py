@@ -11,8 +11,7 @@ from lidarcore import extraction
 from lidarcore.extraction import compare, extract
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, fit_beams
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Scan
-from lidarcore.segments import Ints
+from lidarcore.scan import Array, Ints, Scan
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Array, Ints, Scan
 from lidarcore.simulation.rooms import furnished_room
-from lidarcore.simulation.world import Ints, World
+from lidarcore.simulation.world import World
 
 RATE = 10.0  # revolutions per second, as an RPLIDAR S1 turns
 

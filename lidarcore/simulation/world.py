@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lidarcore.compiled import kernel
-from lidarcore.scan import Array
-
-Ints = NDArray[np.int64]
+from lidarcore.scan import Array, Ints
 
 
 @dataclass(frozen=True, eq=False, slots=True)

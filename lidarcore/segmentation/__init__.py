@@ -1,0 +1,59 @@
+"""From a ring of beams to pieces, one for each wall: iterative end point fit, merged back and tidied (MATH 5).
+
+Points are packed (missing returns left out) and the ring is unrolled from a break, so that every piece is a slice.
+Pieces are inclusive ranges [first, last] of points.
+"""
+
+import numpy as np
+
+from lidarcore.compiled import kernel
+from lidarcore.scan import Array, Ints
+from lidarcore.segmentation.merge import merge, refine_ends
+from lidarcore.segmentation.ring import compact, find_breaks, noise_seen, unroll
+from lidarcore.segmentation.split import split_runs
+from lidarcore.segmentation.sums import SUMS, chi_square, sums
+
+__all__ = ["compact", "find_pieces", "noise_seen"]
+
+
+@kernel
+def find_pieces(
+    points: Array,
+    beams: Ints,
+    n: int,
+    v_rho: float,
+    v_theta: float,
+    threshold: float,
+    gap: float,
+    increment: float,
+    scratch: Array,
+    indices: Ints,
+) -> tuple[Ints, Ints]:
+    """First and last point (P,) of each piece, in the order of the ring.
+
+    points (3, 2 n) and beams (2 n,) hold n points and room to unroll the ring, so that it starts at a break and the
+    result does not depend on where the scan starts. increment is the mean angle between beams, rad;
+    scratch (2 n,) and indices (6, 2 n) are scratch that the result is a part of.
+    """
+    starts, first, last, run, stack = indices[0], indices[1], indices[2], indices[3], indices[4]
+    n_runs = find_breaks(points, n, gap, increment, scratch, starts)
+    closed = n_runs == 0
+    if closed:  # start where the ring surely bends
+        starts[0], n_runs = np.argmax(points[0, :n]), 1
+    while True:
+        starts[n_runs] = starts[0] + n
+        unroll(points, beams, n, starts[0])
+        count = split_runs(
+            points, starts[: n_runs + 1], threshold, v_rho, v_theta, scratch, stack, first, last, run
+        )
+        m = np.empty((count + 1, SUMS))
+        for p in range(count):
+            inside = slice(first[p], last[p] + 1)
+            sums(points[0, inside], points[1, inside], points[2, inside], m[p])
+            m[p, 8] = chi_square(m[p], v_rho, v_theta)
+        count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])
+        refine_ends(points, first, last, run, m, count)
+        if not closed or count < 2:
+            return first[:count], last[:count]
+        # Noise moves the farthest point along the wall: once more from an end that was refined.
+        starts[0], closed = first[1] % n, False

@@ -1,0 +1,107 @@
+"""Neighbouring pieces: merged where one line explains both, else their common end put where it belongs (MATH 5)."""
+
+import numpy as np
+
+from lidarcore.compiled import inlined, kernel
+from lidarcore.scan import Array, Ints
+from lidarcore.segmentation.sums import chi_square, join, line_of
+
+_MERGE_CHI2 = (
+    20.0  # about the 0.9999 quantile for two or three degrees of freedom: splits are chosen, not random
+)
+_REFINE_REACH = 12  # points looked at on each side of a common end
+
+
+@kernel
+def merge(
+    first: Ints,
+    last: Ints,
+    run: Ints,
+    m: Array,
+    count: int,
+    v_rho: float,
+    v_theta: float,
+    cost: Array,
+    chain: Ints,
+) -> int:
+    """Merge neighbours in one run while one line explains both, cheapest first; the number of pieces left.
+
+    first, last, run (count,) and sums m (count, SUMS) are changed in place; cost (count,), chain (2, count) and the
+    row m[count] are scratch.
+    """
+    joined, before, after = m[count], chain[0], chain[1]
+    for i in range(count):
+        before[i], after[i] = i - 1, i + 1
+        cost[i] = _cost_after(i, after, run, m, count, v_rho, v_theta, joined)
+    while True:
+        i = _cheapest(cost, count)
+        if not cost[i] < _MERGE_CHI2:
+            break
+        gone = after[i]
+        cost_of_joining(m[i], m[gone], v_rho, v_theta, joined)
+        m[i] = joined
+        last[i], after[i], cost[gone] = last[gone], after[gone], np.inf
+        run[gone] = -1
+        if after[i] < count:
+            before[after[i]] = i
+        cost[i] = _cost_after(i, after, run, m, count, v_rho, v_theta, joined)
+        k = before[i]
+        if k >= 0:
+            cost[k] = _cost_after(k, after, run, m, count, v_rho, v_theta, joined)
+    kept = 0
+    for i in range(count):
+        if run[i] >= 0:
+            first[kept], last[kept], run[kept], m[kept] = first[i], last[i], run[i], m[i]
+            kept += 1
+    return kept
+
+
+@inlined
+def _cost_after(
+    i: int, after: Ints, run: Ints, m: Array, count: int, v_rho: float, v_theta: float, joined: Array
+) -> float:
+    """Cost of joining a piece with the one after it; infinite at the end of a run."""
+    k = after[i]
+    if k == count or run[k] != run[i]:
+        return np.inf
+    return cost_of_joining(m[i], m[k], v_rho, v_theta, joined)
+
+
+@inlined
+def cost_of_joining(a: Array, b: Array, v_rho: float, v_theta: float, joined: Array) -> float:
+    """By how much the chi-square of the residuals grows if one line serves both pieces."""
+    join(a, b, joined)
+    joined[8] = chi_square(joined, v_rho, v_theta)
+    return joined[8] - a[8] - b[8]
+
+
+@inlined
+def _cheapest(cost: Array, count: int) -> int:
+    best = 0
+    for i in range(1, count):
+        if cost[i] < cost[best]:
+            best = i
+    return best
+
+
+@inlined
+def refine_ends(points: Array, first: Ints, last: Ints, run: Ints, m: Array, count: int) -> None:
+    """Move each common end of two neighbours in one run to where their lines explain the points best."""
+    rho, c, s = points[0], points[1], points[2]
+    for i in range(count - 1):
+        if run[i] != run[i + 1]:
+            continue
+        ax, ay, ar, _ = line_of(m[i])
+        bx, by, br, _ = line_of(m[i + 1])
+        low = max(first[i] + 1, last[i] - _REFINE_REACH)
+        high = min(last[i + 1] - 1, last[i] + _REFINE_REACH)
+        cost = least = 0.0
+        best = low - 1
+        for k in range(low, high):
+            cost += (rho[k] * (ax * c[k] + ay * s[k]) - ar) ** 2 - (
+                rho[k] * (bx * c[k] + by * s[k]) - br
+            ) ** 2
+            if cost < least:
+                best, least = k, cost
+        last[i] = best
+        first[i + 1] = best + 1
