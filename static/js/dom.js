@@ -1,0 +1,53 @@
+// Making and finding elements.
+
+export const $ = (id) => document.getElementById(id);
+
+/** Makes an element: functions under "on…" listen, other non-strings become properties, strings attributes. */
+export function el(tag, properties = {}, ...children) {
+  const node = document.createElement(tag);
+  for (const [key, value] of Object.entries(properties)) {
+    if (key.startsWith("on")) node.addEventListener(key.slice(2), value);
+    else if (typeof value === "string") node.setAttribute(key, value);
+    else node[key] = value;
+  }
+  node.append(...children);
+  return node;
+}
+
+/** An icon of the sprite in index.html. */
+export function icon(name) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  const use = document.createElementNS("http://www.w3.org/2000/svg", "use");
+  svg.setAttribute("aria-hidden", "true");
+  use.setAttribute("href", `#icon-${name}`);
+  svg.append(use);
+  return svg;
+}
+
+/** Changes which icon a button made with `icon` shows. */
+export function setIcon(button, name) {
+  button.querySelector("use").setAttribute("href", `#icon-${name}`);
+}
+
+export function iconButton(name, label, onclick) {
+  return el(
+    "button",
+    { type: "button", class: "icon", "aria-label": label, title: label, onclick },
+    icon(name),
+  );
+}
+
+/** A patch of a method's colour; the name is always written beside it. */
+export function swatch(method) {
+  const patch = el("span", { class: "swatch", "aria-hidden": "true" });
+  patch.style.setProperty("--colour", `var(--method-${method})`);
+  return patch;
+}
+
+/** Writes text only where it differs, into the text node that is there: nothing is laid out for an equal value. */
+export function setText(node, text) {
+  const value = String(text);
+  const first = node.firstChild;
+  if (first?.nodeType !== Node.TEXT_NODE) node.prepend(value);
+  else if (first.data !== value) first.data = value;
+}

@@ -1,0 +1,125 @@
+// The address keeps the view: recording, position, methods, layers and every parameter that is not the default.
+// Opening such an address reproduces the view; what it leaves out is at its default.
+
+import { isExtractionNumber } from "./parameters.js";
+import { merge } from "./optimistic.js";
+import { open, settings as session, transport } from "./session.js";
+import { get, on } from "./store.js";
+
+const WRITE_MS = 500;
+
+const LAYERS = "view.layers.";
+
+/** Settings besides the numbers that a link carries: name in the link -> path, and how it is read. */
+const NAMED = {
+  fitter: { path: "extraction.fitter", read: String },
+  covariance: { path: "extraction.covariance", read: String },
+  compare: { path: "view.compare", read: (text) => text === "true" },
+  methods: { path: "view.methods", read: (text) => text.split(",").filter(Boolean) },
+  colour: { path: "view.colour", read: String },
+  scale: { path: "view.ellipse_scale", read: Number },
+  rotate: { path: "view.rotate", read: (text) => text === "true" },
+};
+
+const at = (object, path) => path.split(".").reduce((node, key) => node?.[key], object);
+const nest = (path, value) => path.split(".").reduceRight((inner, key) => ({ [key]: inner }), value);
+
+/** The fields a link carries, each with its name in the link and its reader. */
+function carried(fields) {
+  const byPath = new Map(fields.map((field) => [field.path, field]));
+  const named = Object.entries(NAMED).map(([name, { path, read }]) => ({
+    name,
+    path,
+    read,
+    preset: byPath.get(path)?.default,
+  }));
+  const numbers = fields
+    .filter(isExtractionNumber)
+    .map(({ key, path, default: preset }) => ({ name: key, path, read: Number, preset }));
+  return [...named, ...numbers];
+}
+
+const layersOf = (fields) => fields.filter(({ path }) => path.startsWith(LAYERS));
+
+/** The hash for a state of the page, without "#". */
+function encode(source, settings, fields) {
+  const link = new URLSearchParams();
+  if (source.kind === "recording") {
+    link.set("recording", source.recording);
+    if (source.topic && source.topics?.length > 1) link.set("topic", source.topic);
+    link.set("index", source.index);
+  } else link.set("source", source.kind);
+  for (const { name, path, preset } of carried(fields)) {
+    const value = at(settings, path);
+    if (String(value) !== String(preset)) link.set(name, value);
+  }
+  const layers = layersOf(fields);
+  const shown = layers.filter(({ path }) => at(settings, path)).map(({ key }) => key);
+  const preset = layers.filter((field) => field.default).map(({ key }) => key);
+  if (shown.join() !== preset.join()) link.set("layers", shown);
+  return link.toString().replaceAll("%2C", ",").replaceAll("%2F", "/");
+}
+
+/** The source and the settings a hash asks for; null if it asks for none. */
+function decode(hash, fields) {
+  const link = new URLSearchParams(hash.replace(/^#/, ""));
+  if (!link.has("recording") && !link.has("source")) return null;
+  const changes = carried(fields).map(({ name, path, read, preset }) =>
+    nest(path, link.has(name) ? read(link.get(name)) : preset),
+  );
+  const shown = link.get("layers")?.split(",");
+  const layers = layersOf(fields).map((field) =>
+    nest(field.path, shown ? shown.includes(field.key) : field.default),
+  );
+  return { source: sourceOf(link), settings: [...changes, ...layers].reduce(merge, {}) };
+}
+
+function sourceOf(link) {
+  if (!link.has("recording")) return { kind: "simulation" };
+  const source = {
+    kind: "recording",
+    name: link.get("recording"),
+    index: Number(link.get("index") ?? 0),
+    paused: true,
+  };
+  return link.has("topic") ? { ...source, topic: link.get("topic") } : source;
+}
+
+/** Reproduces the view of the address; from then on keeps the address up to date. */
+export async function mountLink() {
+  await follow({ reloaded: performance.getEntriesByType("navigation")[0]?.type === "reload" });
+  window.addEventListener("hashchange", () => follow({ reloaded: false }));
+  on(["source", "settings", "frame"], schedule);
+}
+
+/** A reload does not rewind what the server plays meanwhile. */
+async function follow({ reloaded }) {
+  const wanted = decode(location.hash, get("fields"));
+  if (!wanted || (reloaded && isOpen(wanted.source))) return;
+  await session.patch(wanted.settings);
+  if (isOpen(wanted.source)) {
+    if (wanted.source.paused) await transport.patch({ state: "paused", index: wanted.source.index });
+  } else await open(wanted.source);
+}
+
+function isOpen({ kind, name = null, topic = null }) {
+  const source = get("source");
+  return (
+    source.kind === kind && (source.recording ?? null) === name && (topic === null || source.topic === topic)
+  );
+}
+
+let timer = 0;
+
+function schedule() {
+  timer ||= setTimeout(write, WRITE_MS);
+}
+
+function write() {
+  timer = 0;
+  const { kind, index } = get("frame").source;
+  const source = get("source");
+  const current = kind === source.kind ? { ...source, index } : source;
+  const hash = `#${encode(current, get("settings"), get("fields"))}`;
+  if (hash !== location.hash) history.replaceState(null, "", hash);
+}

@@ -1,0 +1,78 @@
+// The page, wired together: rooms are mounted, then the stream feeds the store they read from.
+
+import { request } from "./api.js";
+import { mountColours } from "./colours.js";
+import { mountCorners } from "./corners.js";
+import { mountHeader } from "./header.js";
+import { remember } from "./history.js";
+import { mountLink } from "./link.js";
+import { mountMethod } from "./method.js";
+import { mountParameters } from "./parameters.js";
+import { mountPlots } from "./plots.js";
+import { mountRecordings } from "./recordings.js";
+import { mountRejections } from "./rejections.js";
+import { mountScene } from "./scene.js";
+import { fieldsOf } from "./schema.js";
+import { attempt, settings, transport } from "./session.js";
+import { mountShortcuts, press } from "./shortcuts.js";
+import { get, set } from "./store.js";
+import { connect } from "./stream.js";
+import { mountTabs } from "./tabs.js";
+import { bringPreference, mountTheme } from "./theme.js";
+import { mountTimeline } from "./timeline.js";
+import { mountUpload } from "./upload.js";
+import { mountView } from "./view.js";
+
+mountTheme();
+mountColours();
+mountTabs();
+mountHeader();
+mountScene(press);
+mountTimeline();
+mountMethod();
+mountView();
+mountParameters();
+mountCorners();
+mountPlots();
+mountRecordings();
+mountUpload();
+mountRejections();
+mountShortcuts();
+
+connect({ onOpen: learn, onState: accept, onFrame: show });
+
+/** What never changes while a server runs; asked for once, at the first connection that succeeds. */
+async function learn() {
+  if (get("fields")) return;
+  await attempt(async () => {
+    const [methods, schema] = await Promise.all([
+      request("GET", "methods"),
+      request("GET", "settings/schema"),
+    ]);
+    set("methods", methods.fitters);
+    set("fields", fieldsOf(schema));
+    await begin();
+  });
+}
+
+let known;
+const firstState = new Promise((resolve) => (known = resolve));
+
+async function begin() {
+  await firstState;
+  await bringPreference();
+  await mountLink();
+}
+
+function accept(state) {
+  settings.accept(state.settings);
+  transport.accept(state.source);
+  set("selection", state.selection);
+  set("ready", state.ready);
+  known();
+}
+
+function show(frame) {
+  remember(frame);
+  set("frame", frame);
+}

@@ -1,0 +1,101 @@
+// Numeric settings made from the schema: a slider whose middle is the default, a number, a unit.
+
+import { bind, idOf } from "./bindings.js";
+import { $, el } from "./dom.js";
+import { setting, settings } from "./session.js";
+import { get, on } from "./store.js";
+import { displayOf } from "./units.js";
+
+const STEPS = 400;
+const NOISE_LABELS = { sigma_range: "Range", sigma_bearing: "Bearing" };
+
+export function mountParameters() {
+  on(["fields"], (fields) => {
+    const numeric = fields.filter(isExtractionNumber);
+    fill(
+      $("noise"),
+      numeric.filter(isNoise).map((field) => ({ ...field, label: NOISE_LABELS[field.key] ?? field.label })),
+    );
+    fill(
+      $("segmentation"),
+      numeric.filter((field) => !isNoise(field)),
+    );
+    $("segmentation").append(resetButton());
+  });
+  on(["settings", "fields"], () => {
+    $("reset").disabled = get("fields").filter(isExtractionNumber).every(isDefault);
+  });
+}
+
+/** Number fields of extraction: those this panel shows and a link carries. */
+export const isExtractionNumber = ({ path, maximum }) =>
+  path.startsWith("extraction.") && maximum !== undefined;
+
+const isNoise = ({ path }) => path.includes(".noise.");
+
+const isDefault = (field) => setting(field.path) === field.default;
+
+function fill(section, fields) {
+  section.replaceChildren(section.querySelector("h2"), ...fields.map(parameterRow));
+}
+
+/** A row of label, slider, number and unit for one numeric field of the schema. */
+export function parameterRow(field) {
+  const { unit, scale, digits } = displayOf(field);
+  const id = idOf(field.path);
+  const minimum = field.minimum ?? field.above + scale * 10 ** -digits;
+  const text = (value) => String(Number((value / scale).toFixed(digits)));
+  const number = el("input", {
+    type: "number",
+    id,
+    min: text(minimum),
+    max: text(field.maximum),
+    step: field.integer ? "1" : "any",
+    inputmode: "decimal",
+    "aria-describedby": `${id}-hint`,
+  });
+  bind(number, field.path, { show: text, read: (shown) => tidy(Number(shown) * scale) });
+  return el(
+    "div",
+    { class: "row parameter", title: field.description },
+    el("label", { for: id }, field.label, el("span", { class: "visually-hidden" }, unit && ` in ${unit}`)),
+    slider(field, minimum, { unit, text }),
+    number,
+    el("span", { class: "unit", "aria-hidden": "true" }, unit),
+    el("small", { class: "hint", id: `${id}-hint` }, field.description),
+  );
+}
+
+/** A slider along a power curve that puts the default in the middle. */
+function slider(field, minimum, { unit, text }) {
+  const span = field.maximum - minimum;
+  const power = Math.log((field.default - minimum) / span) / Math.log(0.5);
+  const valueAt = (position) => minimum + span * (position / STEPS) ** power;
+  const positionOf = (value) => STEPS * ((value - minimum) / span) ** (1 / power);
+  const read = (position) => {
+    const rounded = field.integer ? Math.round(valueAt(position)) : Number(valueAt(position).toPrecision(2));
+    return Math.min(field.maximum, Math.max(minimum, rounded));
+  };
+  const show = (value) => {
+    range.setAttribute("aria-valuetext", `${text(value)} ${unit}`);
+    return positionOf(value);
+  };
+  const range = el("input", { type: "range", min: "0", max: String(STEPS), "aria-label": field.label });
+  return bind(range, field.path, { show, read: (position) => read(Number(position)) });
+}
+
+const tidy = (value) => Number(value.toPrecision(12));
+
+function resetButton() {
+  const reset = () => {
+    const numeric = get("fields").filter(isExtractionNumber);
+    const extraction = numeric.reduce((change, field) => assign(change, field), {});
+    settings.patch({ extraction });
+  };
+  return el("button", { type: "button", class: "button", id: "reset", onclick: reset }, "Reset to defaults");
+}
+
+function assign(change, { path, key, default: preset }) {
+  if (isNoise({ path })) return { ...change, noise: { ...change.noise, [key]: preset } };
+  return { ...change, [key]: preset };
+}

@@ -1,0 +1,45 @@
+// "Why is my wall missing?": what was rejected in the current frame, by reason.
+
+import { $, el, setText } from "./dom.js";
+import { on } from "./store.js";
+import { fixed } from "./units.js";
+
+const REFRESH_MS = 1000; // slower than the frames: these are sentences to read
+const MOST = 60;
+
+let drawn = 0;
+
+export function mountRejections() {
+  on(["frame"], ({ rejections }) => setText($("rejection-count"), rejections.length));
+  on(["frame", "panel", "source"], (frame, panel, source) => {
+    const due = source.state !== "playing" || performance.now() - drawn > REFRESH_MS;
+    if (panel === "rejections" && due) draw(frame);
+  });
+}
+
+function draw({ rejections }) {
+  drawn = performance.now();
+  const groups = Map.groupBy(rejections.slice(0, MOST), ({ kind, reason }) => `${kind}: ${reason}`);
+  const sections = [...groups].map(([title, items]) => group(title, items));
+  const beyond = rejections.length - MOST;
+  if (beyond > 0) sections.push(el("p", { class: "muted" }, `And ${beyond} more.`));
+  if (!rejections.length) sections.push(el("p", { class: "empty" }, "Nothing was rejected in this frame."));
+  $("rejection-list").replaceChildren(...sections);
+}
+
+function group(title, items) {
+  const heading = el(
+    "h3",
+    {},
+    title.charAt(0).toUpperCase() + title.slice(1),
+    el("span", { class: "count" }, ` ${items.length}`),
+  );
+  return el("section", {}, heading, el("ul", { class: "reasons" }, ...items.map(entry)));
+}
+
+function entry({ message, xy }) {
+  const where = xy?.every(Number.isFinite)
+    ? ` at\u00a0(${fixed(xy[0], 2)},\u00a0${fixed(xy[1], 2)})\u00a0m`
+    : "";
+  return el("li", {}, message, el("small", {}, where));
+}

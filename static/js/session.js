@@ -1,0 +1,66 @@
+// What a user can do, as one request each. Failures are reported; callers need not catch.
+
+import { Problem, request } from "./api.js";
+import { optimistic } from "./optimistic.js";
+import { get, set } from "./store.js";
+import { report } from "./toasts.js";
+import { chooseTopic } from "./topics.js";
+
+export const settings = optimistic("settings", (change) => request("PATCH", "settings", change));
+export const transport = optimistic("source", (change) => request("PATCH", "source", change));
+
+/** The value at a dotted path of the settings. */
+export const setting = (path) => path.split(".").reduce((node, key) => node?.[key], get("settings"));
+
+/** Changes one setting by its dotted path. */
+export function changeSetting(path, value) {
+  return settings.patch(path.split(".").reduceRight((inner, key) => ({ [key]: inner }), value));
+}
+
+export const toggleSetting = (path) => changeSetting(path, !setting(path));
+
+/** Opens a source, asking for the topic where several fit. Resolves to whether it plays. */
+export async function open(source) {
+  try {
+    await request("PUT", "source", source);
+    return true;
+  } catch (problem) {
+    const topics = problem instanceof Problem && problem.members.topics;
+    if (!topics?.length) {
+      report(problem);
+      return false;
+    }
+    const topic = await chooseTopic(source.name, topics);
+    return topic ? open({ ...source, topic }) : false;
+  }
+}
+
+export const step = (by) => attempt(() => request("POST", "source/step", { by }));
+
+export const isPlaying = ({ state }) => state === "playing" || state === "loading";
+
+export function togglePlaying() {
+  transport.patch({ state: isPlaying(get("source")) ? "paused" : "playing" });
+}
+
+/** Selects a corner by its id, null none; a corner that is gone by now leaves the selection as it was. */
+export async function select(corner) {
+  const before = get("selection");
+  set("selection", { corner });
+  try {
+    await request("PUT", "selection", { corner });
+  } catch (problem) {
+    set("selection", before);
+    if (problem.status !== 404) report(problem);
+  }
+}
+
+/** Runs what may fail; reports the failure. */
+export async function attempt(action) {
+  try {
+    return await action();
+  } catch (problem) {
+    report(problem);
+    return undefined;
+  }
+}

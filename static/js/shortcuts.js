@@ -1,0 +1,142 @@
+// Keyboard shortcuts, declared once: they work, and the help dialog lists them.
+
+import { selectNeighbour } from "./corners.js";
+import { $, el } from "./dom.js";
+import { toggleMethod } from "./method.js";
+import { fitScene } from "./scene.js";
+import { changeSetting, select, setting, step, togglePlaying, toggleSetting, transport } from "./session.js";
+import { get } from "./store.js";
+import { toggleTheme } from "./theme.js";
+
+const LAYERS = { p: "points", s: "segments", o: "corners", e: "ellipses", x: "rejected", g: "grid" };
+const KEY_NAMES = {
+  " ": "Space",
+  ArrowLeft: "←",
+  ArrowRight: "→",
+  ArrowUp: "↑",
+  ArrowDown: "↓",
+  Escape: "Esc",
+};
+
+const SHORTCUTS = [
+  { keys: [" "], about: "Play or pause", run: togglePlaying },
+  {
+    keys: ["ArrowLeft", "ArrowRight"],
+    about: "Step back, forward",
+    run: (key) => step(key === "ArrowLeft" ? -1 : 1),
+  },
+  { keys: ["Home"], about: "Back to the first scan", run: () => transport.patch({ index: 0 }) },
+  { keys: ["l"], about: "Loop", run: () => transport.patch({ loop: !get("source").loop }) },
+  { keys: ["1", "…", "6"], about: "Fitter", run: chooseFitter },
+  { keys: ["⇧1", "…", "⇧6"], about: "Show a method in the comparison" },
+  { keys: ["c"], about: "Compare methods", run: () => toggleSetting("view.compare") },
+  { keys: ["v"], about: "Consistent or published covariance", run: swapCovariance },
+  {
+    keys: Object.keys(LAYERS),
+    about: "Points, segments, corners, ellipses, rejected, grid",
+    run: (key) => toggleSetting(`view.layers.${LAYERS[key]}`),
+  },
+  { keys: ["-", "+"], about: "Smaller, larger ellipses", run: scaleEllipses },
+  {
+    keys: ["ArrowUp", "ArrowDown"],
+    about: "Previous, next corner",
+    run: (key) => selectNeighbour(key === "ArrowUp" ? -1 : 1),
+  },
+  { keys: ["Escape"], about: "Select no corner", run: () => select(null) },
+  { keys: ["f"], about: "Fit the room in the view", run: fitScene },
+  { keys: ["r"], about: "Rotate freely", run: () => toggleSetting("view.rotate") },
+  { keys: ["t"], about: "Light or dark", run: toggleTheme },
+  { keys: ["?"], about: "This help", run: showHelp },
+];
+
+export function mountShortcuts() {
+  document.addEventListener("keydown", (event) => {
+    if (!event.defaultPrevented && !keptBy(event.target, event.key) && press(event)) event.preventDefault();
+  });
+  $("help").addEventListener("click", showHelp);
+}
+
+/** Runs the shortcut of a key, here or forwarded from the scene. Returns whether there is one. */
+export function press({
+  key,
+  code = "",
+  shiftKey = false,
+  ctrlKey = false,
+  metaKey = false,
+  altKey = false,
+}) {
+  const busy = document.querySelector("dialog[open]") || !get("source");
+  if (ctrlKey || metaKey || altKey || busy) return false;
+  const digit = /^(?:Digit|Numpad)([1-6])$/.exec(code)?.[1] ?? (/^[1-6]$/.test(key) ? key : null);
+  if (digit) return shiftKey ? compareWith(digit) : chooseFitter(digit);
+  const wanted = key.length === 1 ? key.toLowerCase() : key;
+  const found = SHORTCUTS.find(({ keys, run }) => run && keys.includes(wanted === "=" ? "+" : wanted));
+  found?.run(wanted);
+  return Boolean(found);
+}
+
+/** Whether the focused control uses the key itself. */
+function keptBy(target, key) {
+  if (target.matches('select, textarea, input:not([type="checkbox"], [type="range"])')) return true;
+  if (target.matches('input[type="range"]')) return key.startsWith("Arrow") || key === "Home";
+  return key === " " && target.matches("button, a, summary, input, label");
+}
+
+const fitterOf = (digit) => get("methods")?.[Number(digit) - 1]?.name;
+
+function chooseFitter(digit) {
+  const name = fitterOf(digit);
+  if (name) changeSetting("extraction.fitter", name);
+  return Boolean(name);
+}
+
+function compareWith(digit) {
+  const name = fitterOf(digit);
+  if (name) toggleMethod(name);
+  return Boolean(name);
+}
+
+function swapCovariance() {
+  const other = setting("extraction.covariance") === "published" ? "consistent" : "published";
+  changeSetting("extraction.covariance", other);
+}
+
+function scaleEllipses(key) {
+  const scale = setting("view.ellipse_scale") * (key === "-" ? 1 / 1.25 : 1.25);
+  changeSetting("view.ellipse_scale", Math.min(100, Math.max(1, Number(scale.toPrecision(2)))));
+}
+
+function showHelp() {
+  const dialog = $("help-dialog");
+  const rows = SHORTCUTS.map(({ keys, about }) =>
+    el(
+      "tr",
+      {},
+      el(
+        "th",
+        { scope: "row" },
+        ...keys.flatMap((key) => (key === "…" ? [" … "] : [el("kbd", {}, keyName(key)), " "])),
+      ),
+      el("td", {}, about),
+    ),
+  );
+  const close = el(
+    "button",
+    { type: "button", class: "button strong", onclick: () => dialog.close() },
+    "Close",
+  );
+  const table = el(
+    "table",
+    { class: "keys" },
+    el("caption", { class: "visually-hidden" }, "Keys and what they do"),
+    el("tbody", {}, ...rows),
+  );
+  dialog.replaceChildren(
+    el("h2", { id: "help-title" }, "Keyboard shortcuts"),
+    table,
+    el("div", { class: "dialog-buttons" }, close),
+  );
+  dialog.showModal();
+}
+
+const keyName = (key) => KEY_NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key);

@@ -1,0 +1,149 @@
+"""A real server in a process of its own, and real browsers that look at it."""
+
+import contextlib
+import io
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import httpx
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Page, expect
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT.parent / "shared" / "data"
+GOLF = DATA / "rplidar_csv_rooms" / "golf_room.csv.gz"
+HOKUYO = DATA / "ccny_hokuyo_rosbag1" / "demo.bag"
+CHROMIUM = "/usr/bin/chromium"
+FLAGS = [
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
+    "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
+]  # fmt: skip
+WASM_BINDING = "unsafe-eval"  # viser's client tries once at its start, is refused, and does without
+expect.set_options(timeout=15_000)
+Pixels = NDArray[np.int64]
+
+
+def wait_until(holds: Callable[[], object], what: str, seconds: float = 20) -> None:
+    """Wait for a condition; fail saying what did not come true."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, f"not within {seconds} s: {what}"
+        time.sleep(0.05)
+
+
+class Server:
+    """`lidarcore serve` on a port that stays its own when it is killed and started again."""
+
+    def __init__(self, folder: Path) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            self.port = probe.getsockname()[1]
+        self.folder, self.url = folder, f"http://127.0.0.1:{self.port}"
+        self.api = httpx.Client(base_url=f"{self.url}/api/v1/", timeout=30)
+
+    def start(self) -> None:
+        command = [sys.executable, "-m", "app.cli", "serve", "--port", str(self.port)]
+        self._process = subprocess.Popen([*command, "--recordings", str(self.folder)], cwd=ROOT)
+        wait_until(self._is_ready, "the server is ready", 120)
+
+    def _is_ready(self) -> bool:
+        assert self._process.poll() is None, f"the server ended with {self._process.returncode}"
+        with contextlib.suppress(httpx.TransportError):
+            return self.get("health")["ready"] and self.api.get("frame").is_success
+        return False
+
+    def kill(self) -> None:
+        os.kill(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def get(self, path: str) -> dict:
+        return self.api.get(path).raise_for_status().json()
+
+    def patch(self, path: str, change: dict) -> dict:
+        return self.api.patch(path, json=change).raise_for_status().json()
+
+    def show(self, recording: Path, index: int) -> None:
+        """Show one scan of a recording, which is put into the folder."""
+        (self.folder / recording.name).write_bytes(recording.read_bytes())
+        choice = {"kind": "recording", "name": recording.name, "index": index, "paused": True}
+        self.api.put("source", json=choice).raise_for_status()
+        position = {"kind": "recording", "index": index}
+        wait_until(lambda: self.get("frame")["source"].items() >= position.items(), f"scan {index} is shown")
+
+    def reset(self) -> None:
+        """As after its start: the simulation plays, settings are the defaults, the folder is empty."""
+        self.api.put("selection", json={"corner": None}).raise_for_status()
+        self.patch("settings", {"extraction": None, "view": None})
+        self.api.put("source", json={"kind": "simulation"}).raise_for_status()
+        self.patch("source", {"speed": 1, "loop": True})
+        for recording in self.get("recordings")["recordings"]:
+            self.api.delete(f"recordings/{recording['name']}").raise_for_status()
+
+
+class Visitor:
+    """A page, everything it asked for, and every error it logged."""
+
+    def __init__(self, page: Page, server: Server) -> None:
+        self.page, self.server = page, server
+        self.asked: list[str] = []
+        self.errors: list[str] = []
+        self.tolerated = [WASM_BINDING]
+        page.on("request", lambda request: self.asked.append(request.url))
+        page.on("websocket", lambda websocket: self.asked.append(websocket.url))
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
+
+    def open(self, hash: str = "") -> "Visitor":
+        self.page.goto(f"{self.server.url}/{hash}")
+        expect(self.page.locator("#readout-frame")).to_have_text(re.compile(r"^\d+$"), timeout=30_000)
+        return self
+
+    def readout(self, name: str) -> str:
+        return self.page.inner_text(f"#readout-{name}")
+
+    def picture(self) -> Pixels:
+        """(H, W, 3) pixels of the scene."""
+        image = Image.open(io.BytesIO(self.page.locator("#scene").screenshot()))
+        return np.asarray(image.convert("RGB")).astype(np.int64)
+
+    def still_picture(self, differs_from: Pixels | None = None, seconds: float = 0.3) -> Pixels:
+        """The picture once nothing has moved in it for so long, and it is no longer the one given."""
+        picture, since = self.picture(), time.monotonic()
+
+        def still() -> bool:
+            nonlocal picture, since
+            before, picture = picture, self.picture()
+            changed = differs_from is None or (picture != differs_from).any()
+            if not changed or (picture != before).any() or not drawn(picture).any():
+                since = time.monotonic()
+            return time.monotonic() - since > seconds
+
+        wait_until(still, "the picture stands still")
+        return picture
+
+    def fit(self) -> None:
+        """Fit the room in the view and wait until the camera has come to rest."""
+        self.page.get_by_role("button", name="Fit the room in the view").click()
+        self.still_picture(seconds=1.5)  # the scene looks every second whether the room is still in the view
+
+    def check(self) -> None:
+        """Nothing went out of this machine, and nothing went wrong."""
+        hosts = {urlsplit(url).netloc for url in self.asked if not url.startswith(("blob:", "data:"))}
+        assert hosts <= {urlsplit(self.server.url).netloc}
+        assert [text for text in self.errors if not any(part in text for part in self.tolerated)] == []
+
+
+def drawn(picture: Pixels) -> NDArray[np.bool_]:
+    """(H, W) where the picture is not its background, which is its commonest colour."""
+    colours, counts = np.unique(picture.reshape(-1, 3), axis=0, return_counts=True)
+    return np.abs(picture - colours[counts.argmax()]).sum(axis=2) > 60

@@ -1,0 +1,58 @@
+"""Servers and browsers for the tests of the page."""
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from browsing import CHROMIUM, FLAGS, Server, Visitor
+from playwright.sync_api import Browser, sync_playwright
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Browser]:
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield chromium
+        chromium.close()
+
+
+@pytest.fixture(scope="session")
+def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    server = Server(tmp_path_factory.mktemp("recordings"))
+    server.start()
+    yield server
+    server.kill()
+
+
+@pytest.fixture
+def server(running: Server) -> Server:
+    """The server that the tests share, as after its start."""
+    running.reset()
+    return running
+
+
+@pytest.fixture
+def visit(browser: Browser, server: Server) -> Iterator[Callable[..., Visitor]]:
+    """Makes a fresh browser with nothing remembered, looking at the shared server unless told another."""
+    visitors: list[Visitor] = []
+
+    def make(
+        width: int = 1000, height: int = 640, theme: str = "dark", at: Server = server, **options: bool | str
+    ) -> Visitor:
+        context = browser.new_context(
+            viewport={"width": width, "height": height}, color_scheme=theme, **options
+        )
+        context.set_default_timeout(20_000)
+        visitors.append(Visitor(context.new_page(), at))
+        return visitors[-1]
+
+    yield make
+    for visitor in visitors:
+        visitor.page.context.close()
+    for visitor in visitors:
+        visitor.check()
+
+
+@pytest.fixture
+def visitor(visit: Callable[..., Visitor]) -> Visitor:
+    """One browser with the page open."""
+    return visit().open()

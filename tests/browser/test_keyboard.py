@@ -1,0 +1,83 @@
+"""Everything important can be done from the keyboard, and `?` tells how."""
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from browsing import Server, Visitor, wait_until
+from playwright.sync_api import Browser, expect
+
+
+def view(server: Server) -> dict:
+    return server.get("settings")["view"]
+
+
+def extraction(server: Server) -> dict:
+    return server.get("settings")["extraction"]
+
+
+@pytest.mark.parametrize(
+    ("key", "holds"),
+    [
+        (" ", lambda server: server.get("source")["state"] == "paused"),
+        ("ArrowRight", lambda server: server.get("source")["state"] == "paused"),
+        ("2", lambda server: extraction(server)["fitter"] == "cwlf"),
+        ("Shift+Digit3", lambda server: "utls" not in view(server)["methods"]),
+        ("c", lambda server: view(server)["compare"]),
+        ("v", lambda server: extraction(server)["covariance"] == "published"),
+        ("g", lambda server: not view(server)["layers"]["grid"]),
+        ("x", lambda server: view(server)["layers"]["rejected"]),
+        ("+", lambda server: view(server)["ellipse_scale"] > 10),
+        ("r", lambda server: view(server)["rotate"]),
+        ("t", lambda server: view(server)["theme"] == "light"),
+        ("l", lambda server: not server.get("source")["loop"]),
+        ("ArrowDown", lambda server: server.get("selection")["corner"] is not None),
+    ],
+)
+def test_key_does_what_the_help_says(keys: Visitor, key: str, holds: Callable[[Server], bool]) -> None:
+    assert not holds(keys.server)
+    keys.page.keyboard.press(key)
+    wait_until(lambda: holds(keys.server), f"{key} has worked")
+
+
+@pytest.fixture(scope="module")
+def keys_page(browser: Browser, running: Server) -> Iterator[Visitor]:
+    """One page for all keys: loading one for each would take a minute."""
+    running.reset()
+    visitor = Visitor(browser.new_page(viewport={"width": 1000, "height": 640}, color_scheme="dark"), running)
+    yield visitor.open()
+    visitor.page.close()
+    visitor.check()
+
+
+@pytest.fixture
+def keys(keys_page: Visitor) -> Visitor:
+    server = keys_page.server
+    server.reset()
+    expect(keys_page.page.get_by_role("button", name="Pause")).to_be_visible()
+    return keys_page
+
+
+def test_question_mark_opens_the_help(keys: Visitor) -> None:
+    keys.page.keyboard.press("?")
+    dialog = keys.page.get_by_role("dialog", name="Keyboard shortcuts")
+    expect(dialog).to_contain_text("Play or pause")
+    keys.page.keyboard.press("c")
+    keys.page.keyboard.press("Escape")
+    expect(dialog).to_be_hidden()
+    assert not view(keys.server)["compare"], "keys do nothing behind a dialog"
+
+
+def test_keys_pressed_in_the_scene_work_too(keys: Visitor) -> None:
+    box = keys.page.locator("#scene").bounding_box()
+    keys.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + 30)
+    assert keys.page.evaluate("document.activeElement.id") == "scene"
+    keys.page.keyboard.press("c")
+    wait_until(lambda: view(keys.server)["compare"], "the page got the key")
+
+
+def test_typing_a_number_is_no_shortcut(keys: Visitor) -> None:
+    keys.page.get_by_role("spinbutton", name="Min points").fill("")
+    keys.page.keyboard.type("12")
+    keys.page.keyboard.press("Enter")
+    wait_until(lambda: extraction(keys.server)["min_points"] == 12, "the number is set")
+    assert extraction(keys.server)["fitter"] == "ml"

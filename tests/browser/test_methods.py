@@ -1,0 +1,146 @@
+"""Settings made in the page are the server's settings, and change the frames."""
+
+import math
+
+import pytest
+from browsing import HOKUYO, Visitor, drawn, wait_until
+from playwright.sync_api import expect
+
+pytestmark = pytest.mark.real_data
+
+METHODS = ("arras_siegwart", "cwlf", "utls", "wtls", "wctls", "ml")
+
+
+def test_fitter_chosen_in_the_page_makes_the_frames(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    for name in ("cwlf", "utls"):
+        page.get_by_label("Fitter").select_option(name)
+        wait_until(lambda name=name: server.get("frame")["fitter"] == name, f"{name} makes the frames")
+        assert server.get("settings")["extraction"]["fitter"] == name
+        expect(page.locator("#corner-table thead")).to_contain_text(name)
+
+
+def test_covariance_kind_changes_the_ellipses(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    page.get_by_label("Fitter").select_option("cwlf")
+    wait_until(lambda: server.get("frame")["fitter"] == "cwlf", "cwlf makes the frames")
+    server.patch("source", {"state": "paused"})
+    consistent = server.get("frame")["summary"]["cwlf"]["median_area"]
+    page.get_by_text("Published", exact=True).click()
+    wait_until(lambda: server.get("frame")["covariance"] == "published", "the frame is made again")
+    assert server.get("frame")["summary"]["cwlf"]["median_area"] < consistent, "cwlf's formula claims less"
+    expect(page.locator("#legend")).to_contain_text("published")
+
+
+def test_comparison_fills_the_table_for_every_method(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    server.show(HOKUYO, 120)
+    page.get_by_role("switch", name="Compare methods").click()
+    wait_until(lambda: set(server.get("frame")["methods"]) == set(METHODS), "all methods are in the frame")
+    frame = server.get("frame")
+    wait_until(lambda: visitor.readout("frame") == str(frame["sequence"]), "the page shows this frame")
+    rows = page.locator("#corner-table tbody tr").all_inner_texts()
+    assert len(rows) == len(frame["corners"]) > 0
+    for row, corner in zip(rows, sorted(frame["corners"], key=lambda c: c["id"]), strict=True):
+        name, *cells = row.replace("\u2212", "-").split()
+        assert name == f"C{corner['id']}"
+        assert len(cells) == 5 * len(METHODS)
+        assert set(corner["by_method"]) == set(METHODS)
+        for method, at in zip(frame["methods"], range(0, len(cells), 5), strict=True):
+            measured = corner["by_method"][method]
+            x, y, sigma_x, sigma_y, area = map(float, cells[at : at + 5])
+            assert (x, y) == pytest.approx((measured["x"], measured["y"]), abs=5.1e-4)
+            assert sigma_x == pytest.approx(1e3 * measured["sigma_x"], abs=0.51)
+            assert sigma_y == pytest.approx(1e3 * measured["sigma_y"], abs=0.51)
+            assert area == pytest.approx(1e6 * measured["area"], abs=0.51)
+
+
+def test_method_taken_out_of_the_comparison_leaves_the_frames(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    server.patch("settings", {"view": {"compare": True}})
+    page.locator("#compared input[data-method=wtls]").uncheck()
+    wait_until(lambda: "wtls" not in server.get("frame")["methods"], "wtls is gone")
+    expect(page.locator("#corner-table thead")).not_to_contain_text("wtls")
+    assert server.get("settings")["view"]["methods"] == [name for name in METHODS if name != "wtls"]
+
+
+def test_noise_is_entered_in_millimetres_and_degrees(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    page.get_by_role("spinbutton", name="Range in mm").fill("35")
+    page.get_by_role("spinbutton", name="Bearing in °").fill("0.5")
+    page.keyboard.press("Enter")
+    wait_until(lambda: server.get("settings")["extraction"]["noise"]["sigma_bearing"] > 0.008, "both are set")
+    noise = server.get("settings")["extraction"]["noise"]
+    assert noise["sigma_range"] == pytest.approx(0.035)
+    assert noise["sigma_bearing"] == pytest.approx(math.radians(0.5))
+
+
+def test_every_parameter_has_its_unit_and_goes_back_to_its_default(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    defaults = server.get("settings")["extraction"]
+    numbers = [name for name, value in defaults.items() if isinstance(value, int | float)]
+    for name in numbers:
+        control = page.locator(f"#setting-extraction-{name}")
+        control.fill(f"{1.5 * float(control.input_value()):g}")
+        page.keyboard.press("Enter")
+    changed = {name: pytest.approx(1.5 * defaults[name], rel=0.01) for name in numbers}
+    wait_until(lambda: server.get("settings")["extraction"] == defaults | changed, "all are changed")
+    page.get_by_role("button", name="Reset to defaults").click()
+    wait_until(lambda: server.get("settings")["extraction"] == defaults, "all are back")
+    units = page.locator("#segmentation .unit").all_inner_texts()
+    assert len(units) == len(numbers)
+    assert set(units) == {"mm", "m", "°", ""}
+
+
+def test_slider_keeps_its_place_while_dragged(visitor: Visitor) -> None:
+    """Others change settings meanwhile, and the echo of every step comes back: neither moves the slider."""
+    server, page = visitor.server, visitor.page
+    slider = page.get_by_role("slider", name="Ellipse scale")
+    box = slider.bounding_box()
+    middle = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + box["width"] / 2, middle)
+    page.mouse.down()
+    for part in (0.6, 0.7, 0.8):
+        page.mouse.move(box["x"] + box["width"] * part, middle)
+        server.patch("settings", {"view": {"colour": "range"}})
+    held = float(slider.input_value())
+    wait_until(lambda: server.get("settings")["view"]["ellipse_scale"] > 50, "the last step has arrived")
+    server.patch("settings", {"view": {"ellipse_scale": 3}})
+    expect(page.locator("#legend")).to_contain_text("× 3,")
+    assert float(slider.input_value()) == held > 250
+    page.mouse.up()
+
+
+def test_value_out_of_range_is_not_sent(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    before = server.get("settings")
+    number = page.get_by_role("spinbutton", name="Min points")
+    number.fill("0")
+    page.keyboard.press("Enter")
+    assert number.evaluate("node => node.validity.rangeUnderflow")
+    assert server.get("settings") == before
+
+
+def test_layers_can_be_hidden(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    server.patch("source", {"state": "paused"})
+    visitor.fit()
+    for layer in ("points", "segments", "ellipses", "grid"):
+        before = drawn(visitor.still_picture()).sum()
+        page.locator("label.chip", has_text=layer.capitalize()).click()
+        wait_until(
+            lambda layer=layer: not server.get("settings")["view"]["layers"][layer], f"{layer} are off"
+        )
+        wait_until(lambda before=before: drawn(visitor.picture()).sum() < before, "less is drawn")
+
+
+def test_rejections_say_why_a_wall_is_missing(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    server.patch("source", {"state": "paused"})
+    server.patch("settings", {"extraction": {"min_length": 2.5}})
+    page.get_by_role("tab", name="Rejected").click()
+    expected = [rejection["message"] for rejection in server.get("frame")["rejections"]]
+    assert expected, "walls of a furnished room are shorter than 2.5 m"
+    expect(page.locator("#rejection-count")).to_have_text(str(len(expected)))
+    for message in expected[:5]:
+        expect(page.locator("#rejection-list")).to_contain_text(message)

@@ -1,0 +1,50 @@
+"""The page lives: it loads from this machine alone, draws, and follows the frames."""
+
+from browsing import Visitor, drawn, wait_until
+from playwright.sync_api import expect
+
+
+def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
+    expect(visitor.page).to_have_title("Simulated room · lidarcore")
+    expect(visitor.page.locator("#connection")).to_have_text("Live")
+    expect(visitor.page.locator("#banner")).to_be_hidden()
+    paths = [url.removeprefix(visitor.server.url) for url in visitor.asked]
+    assert {"/static/js/main.js", "/viser/", "/api/v1/methods"} <= set(paths)
+    visitor.check()
+
+
+def test_scene_shows_the_room(visitor: Visitor) -> None:
+    wait_until(lambda: drawn(visitor.picture()).mean() > 0.01, "something is drawn")
+    rows, columns = drawn(visitor.picture()).nonzero()
+    height, width, _ = visitor.picture().shape
+    assert rows.max() - rows.min() > height / 2, "the room fills the scene"
+    assert columns.max() - columns.min() > width / 3
+
+
+def test_frames_advance_in_figures_and_picture(visitor: Visitor) -> None:
+    first, picture = int(visitor.readout("frame")), visitor.picture()
+    wait_until(lambda: int(visitor.readout("frame")) > first + 5, "later frames are shown")
+    wait_until(lambda: (visitor.picture() != picture).any(), "the picture changes")
+
+
+def test_figures_are_those_of_the_frame(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    server.patch("source", {"state": "paused"})
+    wait_until(
+        lambda: visitor.readout("frame") == str(server.get("frame")["sequence"]), "the last frame is shown"
+    )
+    frame = server.get("frame")
+    assert visitor.readout("corners") == str(len(frame["corners"]))
+    assert visitor.readout("segments") == str(len(frame["segments"][frame["fitter"]]))
+    assert page.locator("#corner-table tbody tr").count() == len(frame["corners"])
+
+
+def test_plots_follow_the_frames(visitor: Visitor) -> None:
+    page = visitor.page
+    page.get_by_role("tab", name="Plots").click()
+    expect(page.locator("#plots figure")).to_have_count(3)
+    inked = "canvas => canvas.getContext('2d').getImageData(0, 0, 300, 200).data.some(value => value > 0)"
+    assert page.locator("#plots canvas").first.evaluate(inked)
+    shown = page.locator("#plots figure").nth(2).locator("output").first
+    before = shown.inner_text()
+    wait_until(lambda: shown.inner_text() != before, "the median area is updated")

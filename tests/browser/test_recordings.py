@@ -1,0 +1,157 @@
+"""Recordings from the page: upload, play, step and seek; what cannot be read is refused with a reason."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browsing import GOLF, HOKUYO, Visitor, drawn, wait_until
+from playwright.sync_api import expect
+from rosbags.rosbag1 import Writer
+from rosbags.typesys import Stores, get_typestore
+
+pytestmark = pytest.mark.real_data
+
+DROP = """([name, text]) => {
+  const data = new DataTransfer();
+  data.items.add(new File([text], name));
+  const options = {dataTransfer: data, bubbles: true, cancelable: true};
+  const fire = (node, type) => node.dispatchEvent(new DragEvent(type, options));
+  const veil = document.getElementById("drop");
+  fire(document.getElementById("scene").contentDocument.body, "dragenter");
+  if (!veil.checkVisibility()) throw new Error("nothing takes the drop");
+  fire(veil, "drop");
+}"""
+
+
+def upload(visitor: Visitor, path: Path) -> None:
+    visitor.page.get_by_role("tab", name="Recordings").click()
+    visitor.page.get_by_label("Recording to upload").set_input_files(path)
+    expect(visitor.page.locator("#readout-source")).to_have_text(path.name)
+
+
+@pytest.fixture
+def golf(visitor: Visitor) -> Visitor:
+    """A page that plays a real recording it has uploaded."""
+    upload(visitor, GOLF)
+    return visitor
+
+
+def test_upload_is_stored_and_plays(golf: Visitor) -> None:
+    server, page = golf.server, golf.page
+    assert (server.folder / GOLF.name).read_bytes() == GOLF.read_bytes()
+    wait_until(lambda: server.get("source")["index"] > 3, "it plays")
+    wait_until(lambda: drawn(golf.picture()).mean() > 0.01, "its room is drawn")
+    wait_until(lambda: page.locator("#corner-table tbody tr").count() > 0, "corners are listed")
+    expect(page.locator("#library [aria-current=true]")).to_contain_text(GOLF.name)
+    assert page.locator("#uploads li").count() == 0, "the progress bar is gone"
+
+
+def test_upload_shows_its_progress(visitor: Visitor) -> None:
+    page = visitor.page
+    slow = {"offline": False, "latency": 0, "downloadThroughput": -1, "uploadThroughput": 500_000}
+    page.context.new_cdp_session(page).send("Network.emulateNetworkConditions", slow)
+    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_label("Recording to upload").set_input_files(HOKUYO)
+    bar = page.get_by_role("progressbar", name=f"Uploading {HOKUYO.name}")
+    wait_until(lambda: 0 < bar.evaluate("bar => bar.value") < 1, "a part is shown as sent")
+    expect(page.locator("#uploads small")).to_contain_text("of 1.0\u2009MB")
+    expect(page.locator("#readout-source")).to_have_text(HOKUYO.name)
+
+
+def test_unreadable_upload_is_refused_and_what_played_goes_on(golf: Visitor) -> None:
+    golf.tolerated.append("422")
+    server, page = golf.server, golf.page
+    page.evaluate(DROP, ["holiday.txt", "no lidar was there"])
+    message = page.locator(".toast.error")
+    expect(message).to_contain_text("holiday.txt")
+    assert not (server.folder / "holiday.txt").exists()
+    frame = server.get("frame")["sequence"]
+    wait_until(lambda: int(golf.readout("frame")) > frame + 3, "the recording goes on")
+    assert golf.readout("source") == GOLF.name
+    message.get_by_role("button", name="Dismiss this message").click()
+    expect(message).to_have_count(0)
+
+
+def test_name_that_is_taken_can_be_replaced(golf: Visitor) -> None:
+    golf.tolerated.append("409")
+    golf.page.get_by_label("Recording to upload").set_input_files(GOLF)
+    golf.page.get_by_role("button", name="Replace it").click()
+    expect(golf.page.locator(".toast")).to_have_count(0)
+    expect(golf.page.locator("#uploads li")).to_have_count(0)
+    wait_until(lambda: golf.server.get("source")["state"] == "playing", "it plays again")
+
+
+def test_transport_pauses_steps_seeks_and_plays_on(golf: Visitor) -> None:
+    server, page = golf.server, golf.page
+    wait_until(lambda: server.get("source")["complete"], "all scans are read")
+    count = server.get("source")["count"]
+    page.get_by_role("button", name="Pause").click()
+    wait_until(lambda: server.get("source")["state"] == "paused", "it is paused")
+    index = server.get("source")["index"]
+    page.get_by_role("button", name="One scan forward").click()
+    expect(page.locator("#position")).to_have_text(f"{index + 2}\u2009/\u2009{count}")
+    page.get_by_role("button", name="One scan back").click()
+    expect(page.locator("#position")).to_have_text(f"{index + 1}\u2009/\u2009{count}")
+    page.get_by_label("Position in the recording").fill("600")
+    wait_until(lambda: server.get("frame")["source"]["index"] == 600, "it has jumped")
+    expect(page.locator("#position")).to_have_text(f"601\u2009/\u2009{count}")
+    page.get_by_label("Speed").select_option("5")
+    page.get_by_role("button", name="Play", exact=True).click()
+    wait_until(lambda: server.get("frame")["source"]["index"] > 610, "it plays on")
+    assert server.get("source")["speed"] == 5
+
+
+def test_end_is_reached_without_loop_and_play_begins_again(golf: Visitor) -> None:
+    server, page = golf.server, golf.page
+    wait_until(lambda: server.get("source")["complete"], "all scans are read")
+    page.get_by_role("button", name="Play in a loop").click()
+    wait_until(lambda: server.get("source")["loop"] is False, "the loop is off")
+    page.get_by_label("Position in the recording").press("End")
+    expect(page.get_by_role("button", name="Play", exact=True)).to_be_visible()
+    assert server.get("source")["state"] == "ended"
+    page.get_by_role("button", name="Play", exact=True).click()
+    wait_until(lambda: 0 < server.get("frame")["source"]["index"] < 100, "it plays from the beginning")
+
+
+def test_recording_can_be_left_and_deleted(golf: Visitor) -> None:
+    server, page = golf.server, golf.page
+    page.get_by_role("button", name="Simulated room").click()
+    expect(page.locator("#readout-source")).to_have_text("Simulated room")
+    page.get_by_role("button", name=f"Delete {GOLF.name}").click()
+    page.get_by_role("button", name="Delete", exact=True).click()
+    expect(page.get_by_role("button", name=f"Delete {GOLF.name}")).to_have_count(0)
+    assert not (server.folder / GOLF.name).exists()
+
+
+def test_one_of_several_lidars_is_chosen(visitor: Visitor, tmp_path: Path) -> None:
+    visitor.tolerated.append("409")
+    page, path = visitor.page, write_two_lidars(tmp_path / "two_lidars.bag")
+    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_label("Recording to upload").set_input_files(path)
+    page.get_by_role("radio", name="/rear").check()
+    page.get_by_role("button", name="Play this topic").click()
+    expect(page.locator("#readout-source")).to_have_text(path.name)
+    expect(page.get_by_label("Lidar topic")).to_have_value("/rear")
+    page.get_by_label("Lidar topic").select_option("/front")
+    wait_until(lambda: visitor.server.get("source")["topic"] == "/front", "the other lidar plays")
+
+
+def write_two_lidars(path: Path) -> Path:
+    """A ROS 1 bag with two lidars, each in a square room of its own size."""
+    store = get_typestore(Stores.ROS1_NOETIC)
+    scan, header, stamp = (
+        store.types[name]
+        for name in ("sensor_msgs/msg/LaserScan", "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    )
+    bearings = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    with Writer(path) as bag:
+        for topic, half in (("/front", 2.0), ("/rear", 3.0)):
+            connection = bag.add_connection(topic, scan.__msgtype__, typestore=store)
+            ranges = (half / np.maximum(abs(np.cos(bearings)), abs(np.sin(bearings)))).astype(np.float32)
+            for turn in range(5):
+                head = header(turn, stamp(100 + turn, 0), "laser")
+                step = float(bearings[1] - bearings[0])
+                angles = float(bearings[0]), float(bearings[-1]), step
+                message = scan(head, *angles, 0.0, 0.1, 0.1, 20.0, ranges, ranges[:0])
+                bag.write(connection, (100 + turn) * 10**9, store.serialize_ros1(message, scan.__msgtype__))
+    return path

@@ -1,0 +1,104 @@
+"""One state for all: links, further browsers, and connections that break."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from browsing import GOLF, Server, Visitor, wait_until
+from playwright.sync_api import expect
+
+pytestmark = pytest.mark.real_data
+
+SHOWN = {"view": {"compare": True, "methods": ["cwlf", "ml"], "colour": "range", "ellipse_scale": 25.0,
+                  "layers": {"grid": False, "rejected": True}},
+         "extraction": {"fitter": "cwlf", "covariance": "published", "min_points": 9, "corner_gap": 0.31,
+                        "noise": {"sigma_range": 0.03}}}  # fmt: skip
+
+
+def test_link_restores_the_view_in_a_fresh_browser(server: Server, visit: Callable[..., Visitor]) -> None:
+    first = visit().open()
+    server.show(GOLF, 123)
+    wanted = server.patch("settings", SHOWN)
+    first.page.wait_for_url("**#*index=123*corner_gap=*")
+    link = "#" + urlsplit(first.page.url).fragment
+    first.page.context.close()
+
+    server.show(GOLF, 5)
+    server.patch("settings", {"extraction": None, "view": None})
+    server.api.put("source", json={"kind": "simulation"}).raise_for_status()
+    second = visit().open(link)
+    wait_until(lambda: server.get("frame")["source"]["index"] == 123, "the scan of the link is shown")
+    wait_until(lambda: server.get("settings") == wanted, "the settings of the link are restored")
+    assert server.get("source")["state"] == "paused"
+    expect(second.page.locator("#position")).to_contain_text("124")
+    expect(second.page.get_by_label("Fitter")).to_have_value("cwlf")
+    expect(second.page.get_by_role("switch", name="Compare methods")).to_be_checked()
+    expect(second.page.locator("#corner-table thead")).to_contain_text("ml")
+    expect(second.page.get_by_role("spinbutton", name="Corner gap")).to_have_value("0.31")
+
+
+def test_link_to_a_recording_that_is_gone_says_so(server: Server, visit: Callable[..., Visitor]) -> None:
+    visitor = visit()
+    visitor.tolerated.append("404")
+    visitor.open("#recording=gone.bag&index=3")
+    expect(visitor.page.locator(".toast.error")).to_contain_text("gone.bag")
+    assert server.get("source")["kind"] == "simulation"
+
+
+def test_plain_address_leaves_what_others_set_up(server: Server, visit: Callable[..., Visitor]) -> None:
+    wanted = server.patch("settings", SHOWN)
+    visit().open()
+    assert server.get("settings") == wanted
+
+
+def test_reload_does_not_rewind_what_plays(server: Server, visit: Callable[..., Visitor]) -> None:
+    visitor = visit().open()
+    server.show(GOLF, 0)
+    server.patch("source", {"state": "playing"})
+    visitor.page.wait_for_url("**#recording=*")
+    index = server.get("source")["index"]
+    visitor.page.reload()
+    wait_until(lambda: server.get("source")["index"] > index + 5, "it plays on")
+    assert server.get("source")["state"] == "playing"
+
+
+def test_second_browser_sees_the_same(server: Server, visit: Callable[..., Visitor]) -> None:
+    first, second = visit().open(), visit().open()
+    first.page.get_by_label("Fitter").select_option("wctls")
+    first.page.get_by_role("switch", name="Compare methods").click()
+    first.page.locator("label.chip", has_text="Grid").click()
+    first.page.get_by_role("button", name="Pause").click()
+    expect(second.page.get_by_label("Fitter")).to_have_value("wctls")
+    expect(second.page.get_by_role("switch", name="Compare methods")).to_be_checked()
+    expect(second.page.get_by_role("checkbox", name="Grid")).not_to_be_checked()
+    expect(second.page.get_by_role("button", name="Play", exact=True)).to_be_visible()
+    wait_until(lambda: first.readout("frame") == second.readout("frame"), "both show the same frame")
+    table = "#corner-table tbody"
+    assert first.page.inner_text(table) == second.page.inner_text(table)
+    first.page.locator("#corner-table tbody button").nth(1).click()
+    expect(second.page.locator("#corner-table tbody tr").nth(1)).to_have_class("selected")
+
+
+@pytest.fixture
+def own_server(tmp_path: Path) -> Iterator[Server]:
+    """A server for one test alone, which may kill it."""
+    server = Server(tmp_path)
+    server.start()
+    yield server
+    server.kill()
+
+
+def test_lost_connection_comes_back_by_itself(own_server: Server, visit: Callable[..., Visitor]) -> None:
+    visitor = visit(at=own_server)
+    visitor.tolerated += ["net::ERR_", "WebSocket", "Failed to fetch"]
+    visitor.open()
+    own_server.kill()
+    expect(visitor.page.locator("#banner")).to_contain_text("Connection lost")
+    expect(visitor.page.locator("#connection")).to_have_text("Reconnecting")
+    own_server.start()
+    expect(visitor.page.locator("#connection")).to_have_text("Live")
+    expect(visitor.page.locator("#banner")).to_be_hidden()
+    shown, picture = int(visitor.readout("frame")), visitor.picture()
+    wait_until(lambda: int(visitor.readout("frame")) > shown + 3, "frames advance again")
+    wait_until(lambda: (visitor.picture() != picture).mean() > 0.001, "the scene moves again")

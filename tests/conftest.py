@@ -1,0 +1,34 @@
+"""The real recordings, which lie beside the checkout: their licences do not allow shipping most of them."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def data() -> Path:
+    """The folder of real recordings."""
+    return DATA
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without the recordings, leave out the tests that read them; CI must have them."""
+    if DATA.is_dir():
+        return
+    if os.environ.get("CI"):
+        pytest.exit(f"CI needs the real recordings in {DATA}.", returncode=1)
+    kept = [item for item in items if not _reads_recordings(item)]
+    config.hook.pytest_deselected(items=[item for item in items if _reads_recordings(item)])
+    items[:] = kept
+
+
+def pytest_report_header() -> str:
+    there = "read from" if DATA.is_dir() else "not found, their tests are left out:"
+    return f"real recordings: {there} {DATA}"
+
+
+def _reads_recordings(item: pytest.Item) -> bool:
+    return item.get_closest_marker("real_data") is not None or "data" in getattr(item, "fixturenames", ())
