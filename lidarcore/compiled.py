@@ -25,6 +25,11 @@ def inlined(function: Function) -> Function:
     return _compile(function, fastmath=_FAST, inline="always")
 
 
+def ordered_kernel(function: Function) -> Function:
+    """The same where the order of operations is what makes the result exact."""
+    return _compile(function, fastmath=_FAST - {"reassoc"})
+
+
 def finite_kernel(function: Function) -> Function:
     """The same for kernels that only ever see finite numbers: maxima vectorise too."""
     return _compile(function, fastmath=_FAST | {"nnan", "ninf"})

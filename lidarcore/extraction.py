@@ -11,7 +11,7 @@ from lidarcore.features import Features
 from lidarcore.lines import FITTER_IDS, FITTERS
 from lidarcore.polar import unit_vectors
 from lidarcore.scan import Array, Ints, Scan
-from lidarcore.segmentation import compact, find_pieces, noise_seen
+from lidarcore.segmentation import compact, find_pieces, mean_increment, noise_seen
 from lidarcore.settings import ExtractionSettings
 from lidarcore.tables import FIELDS
 from lidarcore.walls import fit_pieces
@@ -73,26 +73,32 @@ def _extract(
 ) -> tuple[Array, Ints, float]:
     """For each fitter a table of segments, corners and rejections, the numbers of each, and the noise seen.
 
-    With P pieces a table has rows 0 ... P for segments, P ... 2 P for corners, 2 P ... 4 P for rejections.
+    A table has rows of segments, then corners; rejections are its last rows, backwards from the end.
     """
     v_rho, v_theta, _, _, min_points, min_length, sin_angle, corner_gap = parameters
     points, weights, beams = floats[:3], floats[3], indices[0]
     first, last, seen = _segment(ranges, bearings, parameters, points, beams, weights, indices[1:])
-    pieces = len(first)
-    tables, counts = np.empty((len(fitters), 4 * pieces, FIELDS)), np.empty((len(fitters), 3), np.int64)
+    # Of P pieces every one makes a segment or a rejection, and so does every pair of neighbours: 2 P rows are enough.
+    tables, counts = np.empty((len(fitters), 2 * len(first), FIELDS)), np.empty((len(fitters), 3), np.int64)
     for f in range(len(fitters)):
-        segments, corners, rejections = (
-            tables[f, :pieces],
-            tables[f, pieces : 2 * pieces],
-            tables[f, 2 * pieces :],
+        table, backwards = tables[f], tables[f, ::-1]
+        n, rejected = fit_pieces(
+            points,
+            beams,
+            first,
+            last,
+            fitters[f],
+            v_rho,
+            v_theta,
+            min_points,
+            min_length,
+            weights,
+            table,
+            backwards,
         )
-        found, rejected = fit_pieces(
-            points, beams, first, last, fitters[f], v_rho, v_theta, min_points, min_length, weights,
-            segments, rejections,
-        )  # fmt: skip
-        counts[f, 0] = found
+        counts[f, 0] = n
         counts[f, 1], counts[f, 2] = find_corners(
-            segments, found, sin_angle, corner_gap, corners, rejections, rejected
+            table, n, sin_angle, corner_gap, table[n:], backwards, rejected
         )
     return tables, counts, seen
 
@@ -111,11 +117,10 @@ def _segment(
     v_rho, v_theta, threshold, gap = parameters[:4]
     unit_vectors(bearings, points[1], points[2])
     n = compact(ranges, points, beams)
-    turn = bearings[-1] - bearings[0]
-    increment = (turn if turn > 0 else turn + 2 * np.pi) / max(len(ranges) - 1, 1)
     # Told too little noise, walls would fall apart: pieces are made for the noise seen, if that is larger.
     seen = noise_seen(points[0, :n], scratch)
     v_rho = max(v_rho, seen * seen)
+    increment = mean_increment(bearings)
     first, last = find_pieces(points, beams, n, v_rho, v_theta, threshold, gap, increment, scratch, indices)
     return first, last, seen
 

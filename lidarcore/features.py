@@ -208,10 +208,10 @@ class Features:
         self.scan = scan
         self.settings = settings
         self.fitter = fitter
-        pieces, (n, k, m) = len(table) // 4, counts
+        n, k, m = counts
         self.segments = Segments(table[:n], settings.covariance)
-        self.corners = Corners(table[pieces : pieces + k], settings.covariance)
-        self.rejections = Rejections(table[2 * pieces : 2 * pieces + m], settings.covariance)
+        self.corners = Corners(table[n : n + k], settings.covariance)
+        self.rejections = Rejections(table[::-1][:m], settings.covariance)
         self.noise_seen = noise_seen
 
     @property

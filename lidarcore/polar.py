@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarcore.compiled import kernel
+from lidarcore.compiled import ordered_kernel
 from lidarcore.scan import Array
 
 _TWO_OVER_PI = 2 / np.pi
@@ -10,7 +10,7 @@ _TWO_OVER_PI = 2 / np.pi
 _HALF_PI = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)
 
 
-@kernel
+@ordered_kernel
 def unit_vectors(bearings: Array, c: Array, s: Array) -> None:
     """Write cos and sin of the bearings (N,) rad, |bearing| < 1e5, to c and s; error below 1e-15.
 

@@ -11,6 +11,8 @@ from lidarcore.errors import ScanError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+MAX_BEARING = 100.0  # rad; beyond a few turns they are surely in another unit
+
 
 @dataclass(frozen=True, eq=False)
 class Scan:
@@ -26,7 +28,7 @@ class Scan:
     beam_times  (N,) s after `stamp`, or None
     odometry    (3,) x m, y m, heading rad: T_odom_sensor at `stamp`, or None
 
-    Raises ScanError if the arrays are empty, not of one length, or a bearing is not finite.
+    Raises ScanError if the arrays are empty, not of one length, or a bearing is not finite or not in radians.
     """
 
     ranges: Array
@@ -43,6 +45,8 @@ class Scan:
             raise ScanError("The scan is empty: give at least one beam.")
         if not np.isfinite(bearings).all():
             raise ScanError("A bearing is not a finite number: give every beam its angle in radians.")
+        if np.abs(bearings).max() > MAX_BEARING:
+            raise ScanError(f"Bearings reach {np.abs(bearings).max():g} rad: give radians, not degrees.")
         if not np.isfinite(self.stamp):
             raise ScanError(f"The stamp is {self.stamp}: give seconds, or 0 if unknown.")
         with np.errstate(invalid="ignore"):

@@ -39,7 +39,7 @@ class ExtractionSettings:
     ] = 0.3
     min_points: Annotated[
         int, Field(ge=2, le=1000, description="a segment needs at least this many points")
-    ] = 6
+    ] = 7
     min_length: Annotated[float, _metres(0.0, 10.0, "a segment must be at least this long")] = 0.2
     corner_angle: Annotated[
         float,

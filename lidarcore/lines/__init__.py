@@ -72,7 +72,7 @@ class Fitter:
         Raises ScanError if they differ in shape, or a value is not finite, or a range is not positive;
         DegenerateLineError if the points do not determine a line this fitter can express.
         """
-        rho, theta = np.ascontiguousarray(ranges, np.float64), np.ascontiguousarray(bearings, np.float64)
+        rho, theta = np.array(ranges, np.float64), np.array(bearings, np.float64)
         if rho.shape != theta.shape or rho.ndim != 1:
             raise ScanError(f"ranges {rho.shape} and bearings {theta.shape} must both have shape (N,).")
         if len(rho) < 2:

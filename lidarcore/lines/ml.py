@@ -11,9 +11,8 @@ from lidarcore.lines.line import Array
 from lidarcore.lines.regression import NO_LINE, NOT_FINITE, OK, THROUGH_SENSOR, Fit, Normal, Sym2
 
 _STEPS = 12
-_CONVERGED = (
-    1e-10  # squared relative step of q; each step is smaller by about the relative noise than the last
-)
+# Squared relative step of q at which to stop; the error left is smaller by the relative noise.
+_CONVERGED = 1e-16
 
 
 @inlined
@@ -29,7 +28,7 @@ def fit(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) 
         bx += x
         by += y
     det = xx * yy - xy * xy
-    if not det > 1e-13 * xx * yy:
+    if not det > 1e-13 * (xx + yy) ** 2:
         return THROUGH_SENSOR, NO_LINE, NO_LINE
     qx, qy = (yy * bx - xy * by) / det, (xx * by - xy * bx) / det
     for _ in range(_STEPS):
@@ -63,7 +62,7 @@ def _step(
         bx += e * c[i]
         by += e * s[i]
     det = xx * yy - xy * xy
-    if not det > 1e-13 * xx * yy:
+    if not det > 1e-13 * (xx + yy) ** 2:
         return THROUGH_SENSOR, 0.0, 0.0
     return OK, (yy * bx - xy * by) / det, (xx * by - xy * bx) / det
 

@@ -64,7 +64,8 @@ def _implicit(m: Moments) -> tuple[int, tuple[float, float, float], Normal]:
     c = -(xx * yy - xy * xy + x * a + y * b)
     h = np.sqrt(a * a + b * b)
     r = -c / h
-    if not r * r > 1e-14 * (x * x + y * y + xx + yy):  # also when a = b = 0: NaN
+    # a and b are spread times distance: where they have cancelled to rounding errors, the line is not known.
+    if not (r > 0 and h * h > 1e-14 * (xx + yy) ** 2 * (x * x + y * y + xx + yy)):
         return THROUGH_SENSOR, NO_LINE, NO_LINE
     return OK, (a, b, c), (a / h, b / h, r)
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from lidarcore.compiled import kernel
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.merge import merge, refine_ends
-from lidarcore.segmentation.ring import compact, find_breaks, noise_seen, unroll
+from lidarcore.segmentation.merge import merge, refine_ends, surest_corner
+from lidarcore.segmentation.ring import compact, find_breaks, mean_increment, noise_seen, unroll
 from lidarcore.segmentation.split import split_runs
-from lidarcore.segmentation.sums import SUMS, chi_square, sums
+from lidarcore.segmentation.sums import SUMS, residuals, sums
 
-__all__ = ["compact", "find_pieces", "noise_seen"]
+__all__ = ["compact", "find_pieces", "mean_increment", "noise_seen"]
 
 
 @kernel
@@ -36,7 +36,9 @@ def find_pieces(
     scratch (2 n,) and indices (6, 2 n) are scratch that the result is a part of.
     """
     starts, first, last, run, stack = indices[0], indices[1], indices[2], indices[3], indices[4]
-    n_runs = find_breaks(points, n, gap, increment, scratch, starts)
+    if n == 0:
+        return first[:0], last[:0]
+    n_runs = find_breaks(points, n, gap, increment, v_rho, scratch, starts)
     closed = n_runs == 0
     if closed:  # start where the ring surely bends
         starts[0], n_runs = np.argmax(points[0, :n]), 1
@@ -50,10 +52,11 @@ def find_pieces(
         for p in range(count):
             inside = slice(first[p], last[p] + 1)
             sums(points[0, inside], points[1, inside], points[2, inside], m[p])
-            m[p, 8] = chi_square(m[p], v_rho, v_theta)
+            m[p, 9], variance = residuals(m[p], v_rho, v_theta)
+            m[p, 8] = m[p, 9] / variance
         count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])
         refine_ends(points, first, last, run, m, count)
         if not closed or count < 2:
             return first[:count], last[:count]
-        # Noise moves the farthest point along the wall: once more from an end that was refined.
-        starts[0], closed = first[1] % n, False
+        # Noise moves the farthest point along its wall: once more from where two walls surely meet.
+        starts[0], closed = first[surest_corner(m, count, v_rho, v_theta)] % n, False

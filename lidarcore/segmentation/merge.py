@@ -4,10 +4,10 @@ import numpy as np
 
 from lidarcore.compiled import inlined, kernel
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.sums import chi_square, join, line_of
+from lidarcore.segmentation.sums import join, line_of, residuals
 
 _MERGE_CHI2 = (
-    20.0  # about the 0.9999 quantile for two or three degrees of freedom: splits are chosen, not random
+    25.0  # far out for the two or three parameters saved: splits are chosen at extremes, not at random
 )
 _REFINE_REACH = 12  # points looked at on each side of a common end
 
@@ -69,10 +69,16 @@ def _cost_after(
 
 @inlined
 def cost_of_joining(a: Array, b: Array, v_rho: float, v_theta: float, joined: Array) -> float:
-    """By how much the chi-square of the residuals grows if one line serves both pieces."""
+    """By how much the chi-square of the residuals grows if one line serves both pieces.
+
+    Taken with each piece's own variance, or all with the variance of the joined one, whichever is less: the first
+    errs high on a long wall close by, whose variance differs along it; the second on short pieces, whose best lines
+    follow the beams.
+    """
     join(a, b, joined)
-    joined[8] = chi_square(joined, v_rho, v_theta)
-    return joined[8] - a[8] - b[8]
+    together, variance = residuals(joined, v_rho, v_theta)
+    joined[8], joined[9] = together / variance, together
+    return min(joined[8] - a[8] - b[8], (together - a[9] - b[9]) / variance)
 
 
 @inlined
@@ -105,3 +111,14 @@ def refine_ends(points: Array, first: Ints, last: Ints, run: Ints, m: Array, cou
                 best, least = k, cost
         last[i] = best
         first[i + 1] = best + 1
+
+
+@inlined
+def surest_corner(m: Array, count: int, v_rho: float, v_theta: float) -> int:
+    """The piece that is the most expensive to join with the one before it; m[count] is scratch."""
+    surest, most = 1, -np.inf
+    for i in range(1, count):
+        cost = cost_of_joining(m[i - 1], m[i], v_rho, v_theta, m[count])
+        if cost > most:
+            surest, most = i, cost
+    return surest

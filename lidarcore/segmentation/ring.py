@@ -5,10 +5,11 @@ import numpy as np
 from lidarcore.compiled import finite_kernel, inlined, kernel
 from lidarcore.scan import Array, Ints
 
+_SIGMAS = 1.0  # of the difference of two ranges, allowed between neighbours on a wall seen at a grazing angle
+_CLOSED = 4.0  # a ring is closed if the gap at its ends is less than so many beams
 _GRAZING = 1 / np.sin(
     np.radians(6.0)
 )  # walls seen at less than 6 degrees may fall apart [Borges and Aldon 2004]
-_NOISE_SAMPLES = 256  # ranges that the estimate of the noise looks at
 
 
 @inlined
@@ -29,16 +30,31 @@ def compact(ranges: Array, points: Array, beams: Ints) -> int:
     return n
 
 
+@inlined
+def mean_increment(bearings: Array) -> float:
+    """Mean angle (rad) between beams; over the whole turn where they go all the way around, wherever they start."""
+    n = len(bearings)
+    span = bearings[n - 1] - bearings[0]
+    span = span if span > 0 else span + 2 * np.pi
+    closed = (2 * np.pi - span) * (n - 1) < _CLOSED * span
+    return 2 * np.pi / n if closed else span / max(n - 1, 1)
+
+
 @kernel
-def find_breaks(points: Array, n: int, gap: float, increment: float, excess: Array, breaks: Ints) -> int:
+def find_breaks(
+    points: Array, n: int, gap: float, increment: float, v_rho: float, excess: Array, breaks: Ints
+) -> int:
     """Write where point i is not connected to the one before it, around the ring, to breaks; their number.
 
-    excess (n,) is scratch; breaks has room for n + 1.
+    Two points may be as far apart as the gap, or as on a wall seen at a grazing angle (increment is the angle
+    between beams, rad), and by what the noise of both ranges explains. excess (n,) is scratch; breaks has room
+    for n + 1.
     """
+    noise = _SIGMAS * np.sqrt(2 * v_rho)
     rho, c, s = points[0, :n], points[1, :n], points[2, :n]
     grazing = _GRAZING * increment
-    excess[0] = _excess(rho[n - 1], c[n - 1], s[n - 1], rho[0], c[0], s[0], gap, grazing)
-    _excesses(rho, c, s, gap, grazing, excess)
+    excess[0] = _excess(rho[n - 1], c[n - 1], s[n - 1], rho[0], c[0], s[0], gap, grazing, noise)
+    _excesses(rho, c, s, gap, grazing, noise, excess)
     count = 0
     for i in range(n):
         breaks[count] = i
@@ -47,18 +63,21 @@ def find_breaks(points: Array, n: int, gap: float, increment: float, excess: Arr
 
 
 @finite_kernel
-def _excesses(rho: Array, c: Array, s: Array, gap: float, grazing: float, excess: Array) -> None:
+def _excesses(
+    rho: Array, c: Array, s: Array, gap: float, grazing: float, noise: float, excess: Array
+) -> None:
     for i in range(1, len(rho)):
-        excess[i] = _excess(rho[i - 1], c[i - 1], s[i - 1], rho[i], c[i], s[i], gap, grazing)
+        excess[i] = _excess(rho[i - 1], c[i - 1], s[i - 1], rho[i], c[i], s[i], gap, grazing, noise)
 
 
 @inlined
 def _excess(
-    rho_a: float, c_a: float, s_a: float, rho_b: float, c_b: float, s_b: float, gap: float, grazing: float
-) -> float:
-    """Squared distance between two points, less what is allowed: the gap, or more on a wall seen grazingly."""
+    rho_a: float, c_a: float, s_a: float, rho_b: float, c_b: float, s_b: float,
+    gap: float, grazing: float, noise: float,
+) -> float:  # fmt: skip
+    """Squared distance between two points, less what is allowed."""
     dx, dy = rho_b * c_b - rho_a * c_a, rho_b * s_b - rho_a * s_a
-    limit = max(gap, grazing * min(rho_a, rho_b))
+    limit = max(gap, grazing * min(rho_a, rho_b) + noise)
     return dx * dx + dy * dy - limit * limit
 
 
@@ -79,13 +98,13 @@ def noise_seen(rho: Array, curvature: Array) -> float:
     On a smooth surface this is noise; jumps and corners are few. curvature (n,) is scratch. The median comes from
     counting below a bound that is bisected to within 3 percent, which vectorises.
     """
-    step = max(1, len(rho) // _NOISE_SAMPLES)
-    n = (len(rho) - 2) // step
-    if n < 1:
+    n = len(rho)
+    if n < 3:
         return 0.0
-    for i in range(n):
-        k = i * step
-        curvature[i] = np.abs(rho[k + 1] - 0.5 * (rho[k] + rho[k + 2]))
+    for i in range(1, n - 1):
+        curvature[i] = np.abs(rho[i] - 0.5 * (rho[i - 1] + rho[i + 1]))
+    curvature[0] = np.abs(rho[0] - 0.5 * (rho[n - 1] + rho[1]))
+    curvature[n - 1] = np.abs(rho[n - 1] - 0.5 * (rho[n - 2] + rho[0]))
     low, high = 1e-5, 10.0
     while high > 1.03 * low:
         middle = np.sqrt(low * high)

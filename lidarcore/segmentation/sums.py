@@ -5,7 +5,7 @@ import numpy as np
 from lidarcore.compiled import inlined
 from lidarcore.scan import Array
 
-SUMS = 9  # number, means of x and y, S_xx, S_xy, S_yy, means of c² and c s, chi-square
+SUMS = 10  # number, means of x and y, S_xx, S_xy, S_yy, means of c² and c s, chi-square, sum of squares
 
 
 @inlined
@@ -59,8 +59,8 @@ def line_of(m: Array) -> tuple[float, float, float, float]:
 
 
 @inlined
-def chi_square(m: Array, v_rho: float, v_theta: float) -> float:
-    """Squared distances of a piece's points from its best line, over their mean effective variance (MATH 1).
+def residuals(m: Array, v_rho: float, v_theta: float) -> tuple[float, float]:
+    """Sum of squared distances of a piece's points from its best line, and their mean effective variance (MATH 1).
 
     A short piece close by scatters more along the beams than it is wide, and its best line follows the beams:
     the small variance of that direction makes such a line expensive.
@@ -68,7 +68,7 @@ def chi_square(m: Array, v_rho: float, v_theta: float) -> float:
     half, dev = (m[3] + m[5]) / 2, (m[3] - m[5]) / 2
     root = np.sqrt(dev * dev + m[4] * m[4])
     if root == 0:
-        return 0.0
+        return 0.0, v_rho
     # n n^T = (1 - D) / 2 and t t^T = (1 + D) / 2 with D = [[dev, xy], [xy, -dev]] / root, for n^T U n and t^T M t.
     across = 0.5 * (1 - (dev * (2 * m[6] - 1) + 2 * m[4] * m[7]) / root)
     mx, my = m[1], m[2]
@@ -78,4 +78,4 @@ def chi_square(m: Array, v_rho: float, v_theta: float) -> float:
         + root
         + 0.5 * (dev * (mx * mx - my * my) + 2 * m[4] * mx * my) / root
     )
-    return m[0] * max(half - root, 0.0) / (v_rho * across + v_theta * along)
+    return m[0] * max(half - root, 0.0), v_rho * across + v_theta * along

@@ -32,6 +32,7 @@ class SimulatedSensor:
         ranges, hit = self.world.cast(pose, true_bearings)
         ranges = ranges + rng.normal(0, self.noise.sigma_range, self.beams)
         bearings = true_bearings + rng.normal(0, self.noise.sigma_bearing, self.beams)
+        bearings = (bearings + np.pi) % (2 * np.pi) - np.pi
         ranges[ranges > self.max_range] = np.nan
         quality = np.where(np.isnan(ranges), 0.0, np.clip(60 - 4 * ranges, 5, 60))
         times = np.arange(self.beams) / (RATE * self.beams)
