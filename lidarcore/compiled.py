@@ -3,6 +3,7 @@
 import hashlib
 import os
 import shutil
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,6 +12,7 @@ import numba
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+_STALE = 7 * 24 * 3600  # s after which a folder of compiled kernels that is not this version's is removed
 # Sums may be reordered and fused, so that they vectorise; NaN and inf keep their meaning.
 _FAST = {"reassoc", "contract", "arcp", "nsz"}
 
@@ -52,9 +54,9 @@ def _use_own_cache() -> None:
     sources = (path.read_bytes() for path in sorted(package.rglob("*.py")))
     digest = hashlib.sha256(b"".join(source for source in sources if b"lidarcore.compiled" in source))
     folder = package / "__pycache__" / f"kernels-{digest.hexdigest()[:16]}"
-    for stale in folder.parent.glob("kernels-*"):
-        if stale != folder:
-            shutil.rmtree(stale, ignore_errors=True)
+    for other in folder.parent.glob("kernels-*"):
+        if other != folder and time.time() - other.stat().st_mtime > _STALE:  # a younger one may be in use
+            shutil.rmtree(other, ignore_errors=True)
     numba.config.CACHE_DIR = str(folder)
 
 

@@ -1,12 +1,13 @@
 // Numeric settings made from the schema: a slider whose middle is the default, a number, a unit.
 
 import { bind, idOf } from "./bindings.js";
-import { $, el } from "./dom.js";
+import { $, el, setText } from "./dom.js";
 import { setting, settings } from "./session.js";
 import { get, on } from "./store.js";
 import { displayOf } from "./units.js";
 
 const STEPS = 400;
+const MUCH_MORE = 1.5; // times the noise told: beyond what one scan's estimate is off by chance
 const NOISE_LABELS = { sigma_range: "Range", sigma_bearing: "Bearing" };
 
 export function mountParameters() {
@@ -21,6 +22,12 @@ export function mountParameters() {
       numeric.filter((field) => !isNoise(field)),
     );
     $("segmentation").append(resetButton());
+    $("noise").append(el("p", { class: "muted", id: "noise-seen" }));
+  });
+  on(["frame", "settings", "fields"], (frame) => {
+    const told = setting("extraction.noise.sigma_range");
+    const doubt = frame.noise_seen > MUCH_MORE * told ? ": more than told, so the ellipses claim too much" : "";
+    setText($("noise-seen"), `Range noise seen in this scan: ${(1e3 * frame.noise_seen).toFixed(1)} mm${doubt}.`);
   });
   on(["settings", "fields"], () => {
     $("reset").disabled = get("fields").filter(isExtractionNumber).every(isDefault);

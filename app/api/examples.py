@@ -1,0 +1,79 @@
+"""Examples for the documentation; the tests check that each is what its schema says."""
+
+from typing import Any
+
+Json = dict[str, Any]
+
+MEASURED = {
+    "x": 3.1042,
+    "y": 1.9873,
+    "sigma_x": 0.0041,
+    "sigma_y": 0.0037,
+    "area": 4.3e-05,
+    "covariance": [[1.68e-05, -3.1e-06], [-3.1e-06, 1.37e-05]],
+    "angle": 1.5694,
+}
+SEGMENT = {
+    "id": 0,
+    "alpha": 0.0021,
+    "r": 3.1007,
+    "start": [3.1049, -1.9012],
+    "end": [3.0965, 1.9866],
+    "length": 3.8878,
+    "n_points": 141,
+    "rms": 0.0192,
+    "covariance": [[2.1e-06, -1.0e-07], [-1.0e-07, 2.9e-06]],
+}
+CORNER = {"id": 12, "segments": [0, 1], "selected": True, "by_method": {"ml": MEASURED}}
+POSITION = {"kind": "recording", "index": 41, "count": 278, "time": 4.1}
+FRAME: Json = {
+    "sequence": 1042,
+    "stamp": 1321462573.81,
+    "source": POSITION,
+    "n_beams": 920,
+    "n_valid": 903,
+    "noise_seen": 0.0187,
+    "fitter": "ml",
+    "covariance": "consistent",
+    "methods": ["ml"],
+    "timings": {"extract_us": 131.0, "per_method": {"ml": 22.0}, "draw_us": 690.0, "age_ms": 1.2},
+    "rate_hz": 10.0,
+    "dropped": 0,
+    "segments": {"ml": [SEGMENT]},
+    "corners": [CORNER],
+    "rejections": [
+        {
+            "kind": "segment",
+            "reason": "too few points",
+            "message": "4 points, at least 6 are needed.",
+            "xy": [1.21, -0.4],
+            "first_beam": 311,
+            "last_beam": 314,
+        }
+    ],
+    "summary": {"ml": {"corners": 1, "median_area": 4.3e-05}},
+}
+SOURCE = {
+    "kind": "recording",
+    "recording": "demo.bag",
+    "topic": "/scan",
+    "topics": ["/scan"],
+    "format": "ROS 1 bag",
+    "notes": [],
+    "state": "playing",
+    "error": "demo.bag ends in the middle of a record: what comes before it is played.",
+    "index": 41,
+    "count": 278,
+    "complete": True,
+    "time": 4.1,
+    "duration": 27.7,
+    "speed": 1.0,
+    "loop": True,
+}
+RECORDING = {"name": "demo.bag", "size": 10485760, "modified": "2025-04-01T10:00:00+00:00"}
+SETTINGS_PATCH = {"extraction": {"fitter": "wctls", "min_points": 8}, "view": {"compare": True}}
+
+
+def ok(example: object, description: str, status: int = 200) -> dict[int | str, Json]:
+    """The OpenAPI entry of a good answer with its example."""
+    return {status: {"description": description, "content": {"application/json": {"example": example}}}}

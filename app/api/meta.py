@@ -1,0 +1,110 @@
+"""Health, version, and what methods there are."""
+
+import platform
+import time
+from importlib import metadata
+
+import psutil
+from fastapi import APIRouter
+from typing_extensions import TypedDict
+
+from app.api.dependencies import CurrentHub, CurrentRuntime
+from app.api.examples import ok
+from app.colours import METHOD_COLOURS
+from lidarcore import FITTERS
+
+router = APIRouter(tags=["meta"])
+
+_process = psutil.Process()
+
+
+class HealthJson(TypedDict):
+    status: str
+    ready: bool
+    uptime_s: float
+    clients: int
+    memory_bytes: int
+    cpu_s: float
+
+
+class VersionJson(TypedDict):
+    version: str
+    python: str
+    viser: str
+    numba: str
+
+
+class FitterJson(TypedDict):
+    name: str
+    title: str
+    reference: str
+    summary: str
+    colour: str
+
+
+class MethodsJson(TypedDict):
+    fitters: list[FitterJson]
+    covariances: list[str]
+
+
+METHODS: MethodsJson = {
+    "fitters": [
+        {
+            "name": fitter.name,
+            "title": fitter.title,
+            "reference": fitter.reference,
+            "summary": fitter.summary,
+            "colour": METHOD_COLOURS[fitter.name],
+        }
+        for fitter in FITTERS.values()
+    ],
+    "covariances": ["consistent", "published"],
+}
+HEALTH = {
+    "status": "ok",
+    "ready": True,
+    "uptime_s": 86.1,
+    "clients": 2,
+    "memory_bytes": 187000000,
+    "cpu_s": 4.2,
+}
+VERSION = {"version": "0.1.0", "python": "3.11.7", "viser": "1.1.1", "numba": "0.61.0"}
+
+
+@router.get("/health", responses=ok(HEALTH, "The server lives"))
+def health(runtime: CurrentRuntime, hub: CurrentHub) -> HealthJson:
+    """Whether the kernels are compiled, and what the process has used so far."""
+    cpu = _process.cpu_times()
+    return {
+        "status": "ok",
+        "ready": runtime.ready,
+        "uptime_s": time.time() - _process.create_time(),
+        "clients": hub.clients,
+        "memory_bytes": _process.memory_info().rss,
+        "cpu_s": cpu.user + cpu.system,
+    }
+
+
+@router.get("/version", responses=ok(VERSION, "Versions"))
+def version() -> VersionJson:
+    """Versions of this project and of what its results and pictures depend on."""
+    return {
+        "version": version_of("lidarcore"),
+        "python": platform.python_version(),
+        "viser": version_of("viser"),
+        "numba": version_of("numba"),
+    }
+
+
+@router.get("/methods", responses=ok(METHODS, "The methods"))
+def methods() -> MethodsJson:
+    """The line fitters and the kinds of covariance there are."""
+    return METHODS
+
+
+def version_of(distribution: str) -> str:
+    """The version installed; a checkout that is not installed has none."""
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return "checkout"

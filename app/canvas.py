@@ -1,0 +1,116 @@
+"""The nodes of the viser scene: made once, and what they hold replaced in place."""
+
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+from viser import ViserServer
+
+from app.colours import Rgb, Rgbs, untoned
+from app.shapes import DISC_FACES, DISC_VERTICES, Array, about_z, lift
+
+FIELD_OF_VIEW = np.radians(6.0)  # so narrow that the picture is nearly orthographic
+FAR = 2e4  # m
+HEIGHTS = {  # from the floor up
+    "grid": 0, "labels": 0, "fill": 1, "segments": 2, "outline": 3, "points": 4, "rejected": 5, "crosses": 5,
+    "markers": 6, "sensor": 7, "ring": 8,
+}  # fmt: skip
+
+
+class Canvas:
+    """A map in layers: discs, strokes and points in metres, seen from above."""
+
+    def __init__(self, server: ViserServer) -> None:
+        self._server, self._scene = server, server.scene
+        server.gui.main_panel.minimize()
+        self._scene.world_axes.visible = False
+        self._scene.configure_default_lights(enabled=False)
+        self._scene.configure_environment_map(None)
+        self._scene.add_light_ambient("/light", intensity=np.pi)  # flat: every surface shows its own colour
+        self._nodes: dict[str, Any] = {
+            "grid": self._scene.add_grid(
+                "/grid", infinite_grid=True, fade_distance=FAR, fade_strength=0, shadow_opacity=0
+            ),
+            "labels": self._add_strokes("/labels", 1),
+            "fill": self._add_discs("/ellipses/fill", 0.3),
+            "segments": self._add_strokes("/segments", 4),
+            "outline": self._add_strokes("/ellipses/outline", 1.5),
+            "points": self._add_points("/points", "circle"),
+            "rejected": self._add_points("/rejected/points", "square"),
+            "crosses": self._add_strokes("/rejected/crosses", 2),
+            "markers": self._add_discs("/corners", 1.0),
+            "sensor": self._add_strokes("/sensor", 2),
+            "ring": self._add_strokes("/selection", 3),
+        }
+
+    def fit(self, reach: float) -> None:
+        """Set heights, sizes and the first look for a room that reaches this far, m."""
+        for name, height in HEIGHTS.items():
+            self._nodes[name].position = (0.0, 0.0, height * reach / 500)
+        self._nodes["points"].point_size = self._nodes["rejected"].point_size = reach / 300
+        height = reach / np.tan(FIELD_OF_VIEW / 2)
+        camera = self._server.initial_camera
+        camera.position, camera.look_at = (0.0, -1e-5 * height, height), (0.0, 0.0, 0.0)
+        camera.fov, camera.near, camera.far = FIELD_OF_VIEW, 1.0, FAR
+
+    def paper(self, dark: bool, cell: Rgb, section: Rgb, step: float) -> None:
+        """Set the ground: dark or light, with a section of the grid every `step` metres and a cell every half."""
+        self._server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
+        self._set("grid", cell_color=cell, section_color=section, cell_size=step / 2, section_size=step)
+
+    def visible(self, name: str, visible: bool) -> None:
+        """Show or hide a layer as it is."""
+        self._nodes[name].visible = bool(visible)
+
+    def strokes(self, name: str, visible: bool, strokes: Array, colours: Rgbs) -> None:
+        """Show (S, 2, 2) strokes in one colour (3,) or in (S, 3)."""
+        self.visible(name, visible and len(strokes) > 0)
+        if visible and len(strokes):
+            each = np.broadcast_to(untoned(colours).reshape(-1, 1, 3), (len(strokes), 2, 3))
+            self._set(name, points=lift(strokes), colors=each)
+
+    def points(self, name: str, visible: bool, xy: Array, colours: Rgbs) -> None:
+        """Show points (N, 2) in one colour (3,) or in (N, 3)."""
+        self.visible(name, visible and len(xy) > 0)
+        if visible and len(xy):
+            self._set(name, points=lift(xy), colors=colours)
+
+    def discs(self, name: str, visible: bool, xy: Array, half: Array, angle: Array, colours: Rgbs) -> None:
+        """Show ellipses (C, 2) with half axes (C, 2) turned by angles (C,), in colours (C, 3)."""
+        self.visible(name, visible and len(xy) > 0)
+        if visible and len(xy):
+            self._set(
+                name,
+                batched_positions=lift(xy),
+                batched_wxyzs=about_z(angle),
+                batched_scales=lift(half, 1.0),
+                batched_colors=untoned(colours),
+            )
+
+    def on_click(self, name: str, clicked: Callable[[Any], None]) -> None:
+        """Tell of clicks on the discs of a layer."""
+        self._nodes[name].on_click(clicked)
+
+    def _set(self, name: str, **properties: Any) -> None:
+        for key, value in properties.items():
+            setattr(self._nodes[name], key, value)
+
+    def _add_strokes(self, name: str, thickness: float) -> Any:
+        # A colour for each vertex from the start: viser cannot change from one for all to one for each.
+        colours = np.zeros((1, 2, 3), np.uint8)
+        strokes = np.zeros((1, 2, 3))
+        return self._scene.add_line_segments(
+            name, strokes, colours, thickness=thickness, thickness_units="screen"
+        )
+
+    def _add_points(self, name: str, shape: Literal["circle", "square"]) -> Any:
+        return self._scene.add_point_cloud(
+            name, np.zeros((1, 3)), (0, 0, 0), point_shape=shape, point_shading="flat", precision="float32"
+        )
+
+    def _add_discs(self, name: str, opacity: float) -> Any:
+        return self._scene.add_batched_meshes_simple(
+            name, DISC_VERTICES, DISC_FACES, about_z(np.zeros(1)), np.zeros((1, 3)), opacity=opacity,
+            batched_scales=np.ones((1, 3)), batched_colors=np.zeros((1, 3), np.uint8), side="double", lod="off",
+            material="toon3", cast_shadow=False, receive_shadow=False,
+        )  # fmt: skip

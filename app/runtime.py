@@ -1,0 +1,191 @@
+"""From scans to frames: newest scan first, one immutable settings object for each frame."""
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from app.frame import Frame, Taken
+from app.player import Player
+from app.settings import Settings
+from app.sources import Source
+from app.tracking import Tracker
+from lidarcore import Features, extract, warm_up
+
+logger = logging.getLogger(__name__)
+
+
+class UnknownCornerError(LookupError):
+    """There is no corner of that id in the current frame."""
+
+
+class Slot:
+    """Holds the newest scan; one that is overwritten before it was taken is counted."""
+
+    def __init__(self) -> None:
+        self._item: Taken | None = None
+        self._closed = self._busy = False
+        self._condition = threading.Condition()
+        self.dropped = 0
+
+    @property
+    def idle(self) -> bool:
+        """Nothing waits and nothing is being worked on."""
+        return self._item is None and not self._busy
+
+    def put(self, item: Taken) -> None:
+        with self._condition:
+            self.dropped += self._item is not None and self._item.scan is not item.scan
+            self._item = item
+            self._condition.notify()
+
+    def take(self) -> Taken | None:
+        """Wait for a scan; None when closed."""
+        with self._condition:
+            self._condition.wait_for(lambda: self._item is not None or self._closed)
+            item, self._item = self._item, None
+            self._busy = True
+            return None if self._closed else item
+
+    def done(self) -> None:
+        """The scan taken last has been dealt with."""
+        self._busy = False
+
+    def close(self) -> None:
+        with self._condition:
+            self._closed = True
+            self._condition.notify()
+
+
+class Runtime:
+    """Owns settings, player, selection and the newest frame. Every method may be called from any thread."""
+
+    def __init__(self, source: Source, settings: Settings, draw: Callable[[Frame], None]) -> None:
+        self.settings = settings
+        self.selected: int | None = None
+        self.frame: Frame | None = None
+        self.ready = False
+        self.frame_listeners: list[Callable[[Frame], None]] = []
+        self.change_listeners: list[Callable[[], None]] = []
+        self._draw = draw
+        self._slot = Slot()
+        self.player = Player(source, self._slot.put, lambda: self._slot.idle, self._changed)
+        self._tracker, self._source = Tracker(), 0
+        self._times: deque[float] = deque(maxlen=20)
+        self._sequence = 0
+        self._failing = False
+        self._lock = threading.Lock()
+        self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
+
+    def start(self) -> None:
+        """Compile the kernels in the background, then play."""
+        self._worker.start()
+
+    def close(self) -> None:
+        self.player.close()
+        self._slot.close()
+        self._worker.join(timeout=0.5)
+
+    def set(self, patch: Mapping[str, Any]) -> Settings:
+        """Change settings by a merge patch; the only way there is. Raises pydantic.ValidationError."""
+        with self._lock:
+            self.settings = self.settings.patched(patch)
+        return self._refreshed()
+
+    def select(self, corner: int | None) -> None:
+        """Select a corner of the current frame, or none. Raises UnknownCornerError."""
+        known = {row.id for row in self.frame.corners} if self.frame else set()
+        if corner is not None and corner not in known:
+            raise UnknownCornerError(
+                f"There is no corner {corner} in the current frame; it has {sorted(known)}."
+            )
+        self.selected = corner
+        self._refreshed()
+
+    def open(self, source: Source, index: int = 0, paused: bool = False) -> None:
+        """Play another source."""
+        self.selected = None
+        self.player.open(source, index, paused)
+
+    def _refreshed(self) -> Settings:
+        self.player.refresh()
+        self._changed()
+        return self.settings
+
+    def _changed(self) -> None:
+        for listener in self.change_listeners:
+            listener()
+
+    def _work(self) -> None:
+        try:
+            warm_up()
+        except Exception:
+            logger.exception("the kernels could not be compiled ahead; they will be when they are needed")
+        self.ready = True
+        self.player.start()
+        self._changed()
+        while (taken := self._slot.take()) is not None:
+            self._attempt(taken)
+            self._slot.done()
+            self.player.wake()
+
+    def _attempt(self, taken: Taken) -> None:
+        """One bad scan must not end the show, nor may a thousand of them fill the log."""
+        try:
+            self._publish(self._process(taken))
+            self._failing = False
+        except Exception:
+            if not self._failing:
+                logger.exception("scan %s could not be processed", taken.position)
+            self._failing = True
+
+    def _process(self, taken: Taken) -> Frame:
+        settings = self.settings
+        if taken.source != self._source:
+            self._source = taken.source
+            self._tracker.forget()
+        begin = time.perf_counter()
+        features, method_us = _extract_each(taken, settings)
+        extract_us = 1e6 * (time.perf_counter() - begin)
+        self._sequence += 1
+        return Frame(
+            sequence=self._sequence,
+            taken=taken,
+            settings=settings,
+            features=features,
+            corners=self._tracker.rows(features),
+            selected=self.selected,
+            extract_us=extract_us,
+            method_us=method_us,
+            rate_hz=self._rate(),
+            dropped=self._slot.dropped,
+        )
+
+    def _publish(self, frame: Frame) -> None:
+        begin = time.perf_counter()
+        self._draw(frame)
+        self.frame = frame.drawn(1e6 * (time.perf_counter() - begin))
+        for listener in self.frame_listeners:
+            listener(self.frame)
+
+    def _rate(self) -> float:
+        """Frames per second over the last ones; 0 after a pause."""
+        now = time.monotonic()
+        if self._times and now - self._times[-1] > 2:
+            self._times.clear()
+        self._times.append(now)
+        span = now - self._times[0]
+        return (len(self._times) - 1) / span if span else 0.0
+
+
+def _extract_each(taken: Taken, settings: Settings) -> tuple[dict[str, Features], dict[str, float]]:
+    """The features by every method and the time each took, us. The segmentation is the same for all."""
+    features, times = {}, {}
+    for name in settings.methods:
+        begin = time.perf_counter()
+        features[name] = extract(taken.scan, replace(settings.extraction, fitter=name))
+        times[name] = 1e6 * (time.perf_counter() - begin)
+    return features, times

@@ -1,0 +1,147 @@
+"""What of a frame is drawn where, and what a click means."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from viser import ViserServer
+
+from app.canvas import Canvas
+from app.colours import Rgbs, categorical, method_rgb, rgb, turbo
+from app.frame import Frame
+from app.shapes import ARROW, CIRCLE, CROSS, Array, axis_labels, beams_between, ellipses, nice_step, polylines
+from lidarcore import Features
+
+INKS = {
+    "dark": {"points": "#9fb0c8", "cell": "#1f242c", "section": "#39414d", "label": "#7b8796",
+             "sensor": "#f1f3f5", "rejected": "#ff5c5c", "ring": "#ffe14d"},
+    "light": {"points": "#56657a", "cell": "#eef0f3", "section": "#d0d6de", "label": "#6a7482",
+              "sensor": "#15181c", "rejected": "#c92a2a", "ring": "#b88a00"},
+}  # fmt: skip
+
+
+class Scene:
+    """Draws frames for all browsers; call `draw` from one thread."""
+
+    def __init__(self, server: ViserServer, select: Callable[[int], None]) -> None:
+        """`select` is told the id of a corner that someone clicked."""
+        self._server, self._canvas, self._select = server, Canvas(server), select
+        self._canvas.on_click("markers", self._clicked)
+        self._frame: Frame | None = None
+        self._theme = ""
+        self._source = -1
+        self._reach = 0.0  # m from the sensor to what it sees
+
+    def draw(self, frame: Frame) -> None:
+        """Show the frame."""
+        with self._server.atomic():
+            self._prepare(frame)
+            for draw in (self._draw_scan, self._draw_segments, self._draw_corners, self._draw_rejected):
+                draw(frame)
+        self._server.flush()
+        self._frame = frame
+
+    def _ink(self, name: str) -> Rgbs:
+        return np.array(rgb(INKS[self._theme][name]), np.uint8)
+
+    def _prepare(self, frame: Frame) -> None:
+        """What changes only with the theme or with the room: sizes, colours of the ground, labels."""
+        theme, source = frame.settings.view.theme, frame.taken.source
+        if (theme, source) == (self._theme, self._source):
+            return
+        if source != self._source:
+            distances = np.linalg.norm(frame.taken.scan.xy[frame.taken.scan.valid], axis=1)
+            self._reach = max(1.0, 1.1 * float(np.percentile(distances, 98))) if len(distances) else 5.0
+            self._canvas.fit(self._reach)
+        self._theme, self._source = theme, source
+        inks, step = INKS[theme], nice_step(self._reach)
+        self._canvas.paper(theme == "dark", rgb(inks["cell"]), rgb(inks["section"]), float(step))
+        self._canvas.strokes("labels", True, axis_labels(self._reach, step), self._ink("label"))
+        self._canvas.strokes("sensor", True, ARROW * self._reach / 40, self._ink("sensor"))
+
+    def _draw_scan(self, frame: Frame) -> None:
+        layers, scan = frame.settings.view.layers, frame.taken.scan
+        self._canvas.points("points", layers.points, scan.xy[scan.valid], self._point_colours(frame))
+        for name, visible in (("grid", layers.grid), ("labels", layers.grid), ("sensor", layers.sensor)):
+            self._canvas.visible(name, visible)
+
+    def _point_colours(self, frame: Frame) -> Rgbs:
+        """One colour (3,) for all points, or (N, 3)."""
+        scan, mode = frame.taken.scan, frame.settings.view.colour
+        if mode == "range":
+            return turbo(scan.ranges[scan.valid] / self._reach)
+        if mode == "quality" and scan.quality is not None:
+            quality = scan.quality[scan.valid]
+            return turbo(quality / max(float(quality.max(initial=0)), 1e-9))
+        if mode == "segment":
+            return self._segment_colours(frame)
+        return self._ink("points")
+
+    def _segment_colours(self, frame: Frame) -> Rgbs:
+        """Every point in the colour of the segment it belongs to (N, 3)."""
+        scan, segments = frame.taken.scan, frame.main.segments
+        colours = np.tile(self._ink("points"), (len(scan), 1))
+        ends = zip(segments.first_beam.tolist(), segments.last_beam.tolist(), strict=True)
+        for colour, (first, last) in zip(categorical(len(segments)), ends, strict=True):
+            colours[beams_between(scan, first, last)] = colour
+        return colours[scan.valid]
+
+    def _draw_segments(self, frame: Frame) -> None:
+        found = {name: features.segments for name, features in _main_on_top(frame)}
+        strokes = np.concatenate([np.stack([s.start, s.end], 1) for s in found.values()])
+        if frame.settings.view.colour == "segment" and len(found) == 1:
+            colours = categorical(len(strokes))
+        else:
+            colours = self._method_colours({name: len(segments) for name, segments in found.items()})
+        self._canvas.strokes("segments", frame.settings.view.layers.segments, strokes, colours)
+
+    def _draw_corners(self, frame: Frame) -> None:
+        layers, scale = frame.settings.view.layers, frame.settings.view.ellipse_scale
+        found = {name: features.corners for name, features in _main_on_top(frame)}
+        xy = np.concatenate([corners.xy for corners in found.values()])
+        covariance = np.concatenate([corners.covariance for corners in found.values()])
+        colours = self._method_colours({name: len(corners) for name, corners in found.items()})
+        half, angle, outline = ellipses(xy, covariance, scale)
+        strokes, ink = polylines(outline), np.repeat(colours, len(CIRCLE) - 1, 0)
+        self._canvas.discs("fill", layers.ellipses, xy, half, angle, colours)
+        self._canvas.strokes("outline", layers.ellipses, strokes, ink)
+        dots = np.full_like(xy, self._reach / 130)
+        self._canvas.discs("markers", layers.corners, xy, dots, np.zeros(len(xy)), colours)
+        self._draw_ring(frame)
+
+    def _method_colours(self, counts: dict[str, int]) -> Rgbs:
+        return np.concatenate([np.tile(method_rgb(name, self._theme), (n, 1)) for name, n in counts.items()])
+
+    def _draw_ring(self, frame: Frame) -> None:
+        where = [xy for id_, xy in frame.corner_positions() if id_ == frame.selected]
+        rings = np.array([CIRCLE * self._reach / 28 + xy for xy in where]).reshape(-1, *CIRCLE.shape)
+        self._canvas.strokes("ring", True, polylines(rings), self._ink("ring"))
+
+    def _draw_rejected(self, frame: Frame) -> None:
+        wanted, scan = frame.settings.view.layers.rejected, frame.taken.scan
+        rejections = list(frame.main.rejections) if wanted else []
+        pieces = [beams_between(scan, r.first_beam, r.last_beam) for r in rejections if r.kind == "segment"]
+        points = scan.xy[np.concatenate(pieces)] if pieces else np.empty((0, 2))
+        crosses = [CROSS * self._reach / 90 + r.xy for r in rejections if r.kind == "corner"]
+        strokes = np.array(crosses).reshape(-1, 2, 2)
+        self._canvas.points("rejected", wanted, points, self._ink("rejected"))
+        self._canvas.strokes("crosses", wanted, strokes, self._ink("rejected"))
+
+    def _clicked(self, event: Any) -> None:
+        """Select the corner nearest to where the ray meets the floor."""
+        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
+        if self._frame is None or not np.isfinite([origin, direction]).all() or direction[2] == 0:
+            return
+        floor = (origin - direction * origin[2] / direction[2])[:2]
+        positions = self._frame.corner_positions()
+        if positions:
+            self._select(min(positions, key=lambda row: _distance(row[1], floor))[0])
+
+
+def _distance(a: Array, b: Array) -> float:
+    return float(np.linalg.norm(a - b))
+
+
+def _main_on_top(frame: Frame) -> Iterator[tuple[str, Features]]:
+    """Names and features, the main one last: what is drawn last is on top."""
+    return reversed(frame.features.items())

@@ -1,0 +1,94 @@
+"""The app: REST, WebSocket, page and scene on one port."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+
+from fastapi import APIRouter, FastAPI
+from fastapi.staticfiles import StaticFiles
+from starlette.responses import FileResponse
+
+from app import problems
+from app.api import docs, frame, meta, recordings, selection, settings, source
+from app.library import MAX_BYTES, Library
+from app.runtime import Runtime, UnknownCornerError
+from app.scene import Scene
+from app.security import Guard
+from app.settings import Settings
+from app.sources import RecordingSource, SimulationSource
+from app.stream import Hub
+from app.viser_mount import ViserMount
+
+API = "/api/v1"
+STATIC = Path(str(resources.files("app"))).parent / "static"
+
+
+@dataclass(frozen=True)
+class ServerOptions:
+    """What is decided when the server starts."""
+
+    recordings: Path = Path("recordings")
+    recording: Path | None = None
+    topic: str | None = None
+    settings: Settings = field(default_factory=Settings)
+    max_bytes: int = MAX_BYTES
+    hosts: tuple[str, ...] = ()
+    token: str | None = None
+
+
+def create_app(options: ServerOptions) -> FastAPI:
+    """The whole server as an ASGI app. Raises RecordingError or TopicError for a bad recording."""
+    given = options.recording
+    first = SimulationSource() if given is None else RecordingSource(given, options.topic)
+    mount = ViserMount()
+    scene = Scene(mount.server, lambda corner: _try_to_select(runtime, corner))
+    runtime = Runtime(first, options.settings, scene.draw)
+    hub = Hub(runtime)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        hub.open()
+        runtime.start()
+        yield
+        hub.close()
+        runtime.close()
+        mount.close()
+
+    app = FastAPI(
+        title="lidarcore",
+        version=meta.version_of("lidarcore"),
+        description="2D lidar scans to walls, corners and their covariances. Metres, radians, seconds.",
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        responses=problems.documented(422),
+    )
+    app.state.runtime, app.state.hub, app.state.viser = runtime, hub, mount.server
+    app.state.library = Library(options.recordings, options.max_bytes, given)
+    problems.install(app)
+    problems.document(app)
+    api = APIRouter(prefix=API)
+    for module in (frame, settings, recordings, source, selection, meta):
+        api.include_router(module.router)
+    app.include_router(api)
+    app.include_router(docs.router)
+    mount.install(app)
+    _add_page(app)
+    app.add_middleware(Guard, hosts=options.hosts, token=options.token, uploads=f"{API}/recordings/")
+    return app
+
+
+def _try_to_select(runtime: Runtime, corner: int) -> None:
+    """A click may come after its corner has gone."""
+    with suppress(UnknownCornerError):
+        runtime.select(corner)
+
+
+def _add_page(app: FastAPI) -> None:
+    @app.get("/", include_in_schema=False)
+    def page() -> FileResponse:
+        return FileResponse(STATIC / "index.html")
+
+    app.mount("/static", StaticFiles(directory=STATIC), name="static")

@@ -1,0 +1,181 @@
+"""Where scans come from: the built-in simulated room, or a recording read ahead in the background."""
+
+import logging
+import threading
+import time
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal, Protocol
+
+from lidarcore import LidarError, Scan, TopicError, open_recording
+from lidarcore.simulation import demo_scans
+
+PERIOD = 0.1  # s between scans whose stamps do not grow
+HISTORY = 200  # simulated scans kept for stepping back
+MEMORY = 1 << 30  # bytes of scans kept of one recording
+BYTES_PER_BEAM = 60  # ranges, bearings, quality, times; xy and validity once they were asked for
+PROGRESS_EVERY = 0.5  # s between reports of how much is loaded
+
+logger = logging.getLogger(__name__)
+
+
+class Source(Protocol):
+    """Scans by index, from 0. `count` is how many there are so far, None if they never end."""
+
+    kind: Literal["simulation", "recording"]
+    name: str | None = None
+    topic: str | None = None
+    topics: tuple[str, ...] = ()
+    format: str | None = None
+    error: str | None = None
+    complete: bool = False
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def count(self) -> int | None:
+        return None
+
+    @property
+    def duration(self) -> float | None:
+        return None
+
+    @abstractmethod
+    def nearest(self, index: int) -> int:
+        """The index closest to the one asked for that there is, or that may still come."""
+
+    @abstractmethod
+    def scan(self, index: int) -> Scan | None:
+        """The scan, None if it is not there yet."""
+
+    @abstractmethod
+    def time(self, index: int) -> float:
+        """Play time of a scan that is there, s since the first one."""
+
+    @abstractmethod
+    def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
+        """Begin to read ahead; `arrived` is called after every scan, `progress` now and then."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Stop reading ahead."""
+
+
+class SimulationSource(Source):
+    """An endless walk through a furnished room; the last HISTORY scans can be stepped back to."""
+
+    kind = "simulation"
+
+    def __init__(self) -> None:
+        self._scans = demo_scans()
+        self._kept: deque[Scan] = deque(maxlen=HISTORY)
+        self._made = 0
+
+    def nearest(self, index: int) -> int:
+        return max(self._made - len(self._kept), min(index, self._made + HISTORY), 0)
+
+    def scan(self, index: int) -> Scan:
+        while self._made <= index:
+            self._kept.append(next(self._scans))
+            self._made += 1
+        return self._kept[index - self._made]
+
+    def time(self, index: int) -> float:
+        return index * PERIOD
+
+    def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
+        """Scans are made when they are asked for."""
+
+    def close(self) -> None:
+        """There is nothing to stop."""
+
+
+class RecordingSource(Source):
+    """A recording, checked by its first scan when made; the others follow in a thread once started.
+
+    Raises RecordingError or TopicError if it cannot be played.
+    """
+
+    kind = "recording"
+
+    def __init__(self, path: Path, topic: str | None = None) -> None:
+        self._recording = open_recording(path, topic)
+        next(iter(self._recording))
+        self.name, self.format = path.name, self._recording.name
+        self.topic, self.topics = self._recording.topic, self._recording.topics
+        self._cut: tuple[str, ...] = ()
+        self._scans: list[Scan] = []
+        self._times: list[float] = []
+        self._closed = False
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return (*self._recording.notes, *self._cut)
+
+    @property
+    def count(self) -> int:
+        return len(self._times)
+
+    @property
+    def duration(self) -> float:
+        return self._times[-1] if self._times else 0.0
+
+    def nearest(self, index: int) -> int:
+        return max(0, min(index, self.count - 1) if self.complete else index)
+
+    def scan(self, index: int) -> Scan | None:
+        return self._scans[index] if index < self.count else None
+
+    def time(self, index: int) -> float:
+        return self._times[index]
+
+    def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
+        threading.Thread(target=self._load, args=(arrived, progress), name="loader", daemon=True).start()
+
+    def close(self) -> None:
+        self._closed = True
+
+    def _load(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
+        try:
+            self._read(arrived, progress)
+        except LidarError as error:
+            self.error = str(error)
+        except Exception as error:
+            logger.exception("reading %s", self.name)
+            self.error = f"Reading stopped after {self.count} scans: {type(error).__name__}: {error}"
+        self.complete = True
+        arrived()
+        progress()
+
+    def _read(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
+        size, reported = 0, time.monotonic()
+        for scan in self._recording:
+            if self._closed:
+                return
+            self._append(scan)
+            arrived()
+            size += BYTES_PER_BEAM * len(scan)
+            if size > MEMORY:
+                self._cut = (f"only the first {self.count} scans are played: more would not fit in memory",)
+                return
+            if time.monotonic() - reported > PROGRESS_EVERY:
+                reported = time.monotonic()
+                progress()
+
+    def _append(self, scan: Scan) -> None:
+        """Play time follows the stamps; where they do not grow, PERIOD stands in."""
+        step = scan.stamp - self._scans[-1].stamp if self._scans else 0.0
+        self._scans.append(scan)
+        self._times.append(self._times[-1] + (step if step > 0 else PERIOD) if self._times else 0.0)
+
+
+def check_readable(path: Path) -> None:
+    """Read the first scan. Raises RecordingError; several topics to choose from are fine."""
+    try:
+        next(iter(open_recording(path)))
+    except TopicError:
+        return

@@ -1,0 +1,117 @@
+"""Newest wins: each client of the stream has room for one state and one frame, and never gets an old one."""
+
+import asyncio
+from collections.abc import Callable
+
+from pydantic_core import to_json
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from app.frame import Frame
+from app.runtime import Runtime
+
+
+class Mailbox:
+    """What one client has still to be sent."""
+
+    def __init__(self, points: bool) -> None:
+        self._points = points
+        self._news = asyncio.Event()
+        self._state_changed = False
+        self._frame: Frame | None = None
+
+    def put_state(self) -> None:
+        self._state_changed = True
+        self._news.set()
+
+    def put_frame(self, frame: Frame) -> None:
+        self._frame = frame
+        self._news.set()
+
+    async def take(self, state: Callable[[], str]) -> list[str]:
+        """Wait for news; the messages to send now, made at this moment."""
+        await self._news.wait()
+        self._news.clear()
+        changed, self._state_changed = self._state_changed, False
+        frame, self._frame = self._frame, None
+        messages = [state()] if changed else []
+        if frame is not None:
+            messages.append(_message("frame", frame.text_with_points if self._points else frame.text))
+        return messages
+
+
+class Hub:
+    """Hands what the runtime's threads produce to the clients on the event loop."""
+
+    def __init__(self, runtime: Runtime) -> None:
+        self._runtime = runtime
+        self._mailboxes: set[Mailbox] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        runtime.frame_listeners.append(lambda frame: self._post(Mailbox.put_frame, frame))
+        runtime.change_listeners.append(lambda: self._post(Mailbox.put_state))
+
+    @property
+    def clients(self) -> int:
+        return len(self._mailboxes)
+
+    def open(self) -> None:
+        """Deliver from now on, on the running event loop."""
+        self._loop = asyncio.get_running_loop()
+
+    def close(self) -> None:
+        self._loop = None
+
+    def state(self) -> str:
+        """Everything but the frames, as a message."""
+        runtime = self._runtime
+        state = {
+            "settings": runtime.settings.model_dump(),
+            "source": runtime.player.describe(),
+            "selection": {"corner": runtime.selected},
+            "ready": runtime.ready,
+        }
+        return _message("state", to_json(state).decode())
+
+    async def serve(self, websocket: WebSocket, points: bool) -> None:
+        """Feed one accepted client until it goes."""
+        mailbox = Mailbox(points)
+        mailbox.put_state()
+        if self._runtime.frame is not None:
+            mailbox.put_frame(self._runtime.frame)
+        self._mailboxes.add(mailbox)
+        sender = asyncio.create_task(self._send(websocket, mailbox))
+        receiver = asyncio.create_task(_ignore(websocket))
+        try:
+            await asyncio.wait((sender, receiver), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._mailboxes.discard(mailbox)
+            sender.cancel()
+            receiver.cancel()
+            await asyncio.gather(sender, receiver, return_exceptions=True)
+
+    async def _send(self, websocket: WebSocket, mailbox: Mailbox) -> None:
+        while True:
+            for message in await mailbox.take(self.state):
+                await websocket.send_text(message)
+
+    def _post(self, put: Callable[..., None], *args: object) -> None:
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._deliver, put, *args)
+
+    def _deliver(self, put: Callable[..., None], *args: object) -> None:
+        for mailbox in self._mailboxes:
+            put(mailbox, *args)
+
+
+async def _ignore(websocket: WebSocket) -> None:
+    """Read and forget what the client says, to notice when it goes."""
+    try:
+        while True:
+            await websocket.receive()
+    except (WebSocketDisconnect, RuntimeError):
+        return
+
+
+def _message(kind: str, json: str) -> str:
+    """A JSON object with its type as first member; nothing is encoded twice."""
+    return f'{{"type":"{kind}",{json[1:]}'

@@ -1,0 +1,132 @@
+"""Real servers on ports of their own, real clients, and a room whose corners are known."""
+
+import asyncio
+import json
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+import numpy as np
+import viser
+from websockets.sync.client import ClientConnection, connect
+
+from app.runtime import Runtime
+from app.serve import listen, uvicorn_server
+from app.server import ServerOptions, create_app
+
+ROOT = Path(__file__).parents[2]
+CORNERS = np.array([[3.5, 2.2], [-2.5, 2.2], [-2.5, -1.8], [3.5, -1.8]])  # m, in the sensor frame
+Json = dict[str, Any]
+
+
+class Server:
+    """A server in a thread: its address, a client, and its inside for what cannot be seen from outside."""
+
+    def __init__(self, folder: Path, **options: Any) -> None:
+        app = create_app(ServerOptions(recordings=folder, **options))
+        self.runtime: Runtime = app.state.runtime
+        self.viser: viser.ViserServer = app.state.viser
+        self.folder = folder
+        self._listening = listen("127.0.0.1", 0)
+        self.port: int = self._listening.getsockname()[1]
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.http = httpx.Client(base_url=f"{self.url}/api/v1", timeout=30)
+        self._server = uvicorn_server(app)
+        self._thread = threading.Thread(
+            target=lambda: asyncio.run(self._server.serve(sockets=[self._listening])), daemon=True
+        )
+        self._thread.start()
+
+    def stop(self) -> None:
+        self.http.close()
+        self._server.should_exit = True
+        self._thread.join(timeout=10)
+        assert not self._thread.is_alive(), "the server did not stop"
+
+    def get(self, path: str, **params: Any) -> Any:
+        return self.http.get(path, params=params).raise_for_status().json()
+
+    def change(self, method: str, path: str, body: object) -> Any:
+        return self.http.request(method, path, json=body).raise_for_status().json()
+
+    @contextmanager
+    def stream(self, **options: Any) -> Iterator["Stream"]:
+        with connect(f"ws://127.0.0.1:{self.port}/api/v1/stream?points=true", max_size=None, **options) as ws:
+            yield Stream(ws)
+
+    def next_frame(self) -> Json:
+        """A frame of a scan that is taken after this call."""
+        with self.stream() as stream:
+            newest = stream.frame()
+            return stream.frame(lambda frame: frame["sequence"] > newest["sequence"])
+
+    def play(self, path: Path, **options: Any) -> Json:
+        """Put the file into the folder, play it from its first scan, and return the first frame of it."""
+        with self.stream() as stream:
+            self.change("PUT", "/source", {"kind": "recording", "name": path.name, **options})
+            return stream.frame(lambda frame: frame["source"]["kind"] == "recording")
+
+
+class Stream:
+    """The messages of the WebSocket, waited for."""
+
+    def __init__(self, websocket: ClientConnection) -> None:
+        self.websocket = websocket
+
+    def message(self) -> Json:
+        return strict_json(self.websocket.recv(timeout=30))
+
+    def until(self, kind: str, holds: Callable[[Json], object]) -> Json:
+        while True:
+            message = self.message()
+            if message["type"] == kind and holds(message):
+                return message
+
+    def frame(self, holds: Callable[[Json], object] = bool) -> Json:
+        return self.until("frame", holds)
+
+    def state(self, holds: Callable[[Json], object] = bool) -> Json:
+        return self.until("state", holds)
+
+
+def strict_json(text: str | bytes) -> Any:
+    """JSON without the NaN and Infinity that Python would let pass."""
+
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is not JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def room_ranges(bearings: np.ndarray) -> np.ndarray:
+    """Ranges to the walls of the rectangle with the given CORNERS, by plain geometry."""
+    (x_high, y_high), (x_low, y_low) = CORNERS[0], CORNERS[2]
+    c, s = np.cos(bearings), np.sin(bearings)
+    with np.errstate(divide="ignore"):
+        return np.minimum(np.maximum(x_high / c, x_low / c), np.maximum(y_high / s, y_low / s))
+
+
+def write_room(path: Path, scans: int = 30, period: float = 0.1, noise: float = 0.005) -> Path:
+    """A recording of a sensor that stands still in that room."""
+    rng = np.random.default_rng(1)
+    bearings = np.linspace(-np.pi, np.pi, 720, endpoint=False)
+    ranges = room_ranges(bearings) + rng.normal(0, noise, (scans, len(bearings)))
+    with path.open("wb") as file:
+        np.savez(file, ranges=ranges, bearings=bearings, stamps=100 + period * np.arange(scans))
+    return path
+
+
+def assert_problem(response: httpx.Response, status: int) -> Json:
+    """The answer is problem details (RFC 9457) of that status; returned for what else they should say."""
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    problem = strict_json(response.text)
+    assert problem["status"] == status
+    assert problem["title"]
+    assert problem["detail"]
+    assert problem["instance"] == urlsplit(str(response.request.url)).path
+    return problem

@@ -1,0 +1,141 @@
+import re
+from typing import Any
+
+import httpx
+import pytest
+from pydantic import TypeAdapter
+from serving import Json, Server, strict_json
+
+import lidarcore
+from app.api.meta import HealthJson, MethodsJson, VersionJson
+from app.api.recordings import RecordingsJson
+from app.api.selection import Selection
+from app.library import RecordingJson
+from app.player import SourceJson
+from app.settings import Settings
+from app.wire import CornerJson, FrameJson, SegmentJson
+
+TYPES = {
+    ("get", "/health"): HealthJson,
+    ("get", "/version"): VersionJson,
+    ("get", "/methods"): MethodsJson,
+    ("get", "/settings"): Settings,
+    ("patch", "/settings"): Settings,
+    ("get", "/settings/schema"): dict,
+    ("get", "/frame"): FrameJson,
+    ("get", "/segments"): list[SegmentJson],
+    ("get", "/corners"): list[CornerJson],
+    ("get", "/recordings"): RecordingsJson,
+    ("put", "/recordings/{name}"): RecordingJson,
+    ("delete", "/recordings/{name}"): None,
+    ("get", "/source"): SourceJson,
+    ("put", "/source"): SourceJson,
+    ("patch", "/source"): SourceJson,
+    ("post", "/source/step"): SourceJson,
+    ("get", "/selection"): Selection,
+    ("put", "/selection"): Selection,
+}
+
+
+@pytest.fixture(scope="module")
+def document(shared_server: Server) -> Json:
+    return strict_json(httpx.get(f"{shared_server.url}/openapi.json").text)
+
+
+def operations(document: Json) -> dict[tuple[str, str], Json]:
+    return {
+        (method, path.removeprefix("/api/v1")): operation
+        for path, methods in document["paths"].items()
+        for method, operation in methods.items()
+    }
+
+
+def test_every_route_is_documented_in_words(document: Json) -> None:
+    assert operations(document).keys() == TYPES.keys()
+    for operation in operations(document).values():
+        assert operation["summary"]
+        assert len(operation["description"]) > 10
+        assert operation["tags"]
+
+
+def test_every_answer_has_an_example_that_is_what_its_schema_says(document: Json) -> None:
+    for route, type_ in TYPES.items():
+        if type_ is None:
+            continue
+        answers = [
+            a for status, a in operations(document)[route]["responses"].items() if status.startswith("2")
+        ]
+        example = answers[0]["content"]["application/json"]["example"]
+        TypeAdapter(type_).validate_python(example)
+
+
+def test_every_body_has_an_example_that_the_route_takes(shared_server: Server, document: Json) -> None:
+    for (method, path), operation in operations(document).items():
+        for content in operation.get("requestBody", {}).get("content", {}).values():
+            if path == "/recordings/{name}":
+                continue
+            assert content["schema"]["examples"]
+            for example in content["schema"]["examples"]:
+                status = shared_server.http.request(method, path, json=example).status_code
+                assert status in (200, 404), (path, example)  # 404: no such recording or corner here
+
+
+def test_every_error_is_documented_as_a_problem(document: Json) -> None:
+    assert "ProblemJson" in document["components"]["schemas"]
+    for route, operation in operations(document).items():
+        for status, answer in operation["responses"].items():
+            if not status.startswith("2"):
+                assert list(answer["content"]) == ["application/problem+json"], (route, status)
+
+
+def references(node: Any) -> set[str]:
+    if isinstance(node, dict):
+        here = {node["$ref"]} if isinstance(node.get("$ref"), str) else set()
+        return here.union(*map(references, (v for k, v in node.items() if k != "example")))
+    return set().union(*map(references, node)) if isinstance(node, list) else set()
+
+
+def test_no_reference_leads_nowhere(document: Json) -> None:
+    for reference in references(document):
+        assert reference.rpartition("/")[2] in document["components"]["schemas"], reference
+
+
+def test_the_page_shows_every_route_and_needs_nothing_from_elsewhere(
+    shared_server: Server, document: Json
+) -> None:
+    page = httpx.get(f"{shared_server.url}/docs")
+    assert page.headers["content-type"].startswith("text/html")
+    for path in document["paths"]:
+        assert f"<code>{path}</code>" in page.text
+    assert "<script" not in page.text
+    assert not re.findall(r"(?:src|href)=['\"]?(?:https?:)?//", page.text)
+
+
+def test_health_version_and_methods_say_what_is(server: Server) -> None:
+    server.next_frame()
+    health = server.get("/health")
+    TypeAdapter(HealthJson).validate_python(health)
+    assert health["status"] == "ok"
+    assert health["ready"] is True
+    assert health["cpu_s"] > 0
+    assert health["memory_bytes"] > 10e6
+    with server.stream() as stream:
+        stream.frame()
+        assert server.get("/health")["clients"] == 1
+    version = server.get("/version")
+    assert version["viser"] == "1.1.1"
+    methods = server.get("/methods")
+    assert [f["name"] for f in methods["fitters"]] == list(lidarcore.FITTERS)
+    for method in methods["fitters"]:
+        fitter = lidarcore.FITTERS[method["name"]]
+        assert (method["title"], method["summary"]) == (fitter.title, fitter.summary)
+        assert re.fullmatch(r"#[0-9a-f]{6}", method["colour"])
+    assert methods["covariances"] == ["consistent", "published"]
+
+
+def test_the_page_and_its_files_are_served(shared_server: Server) -> None:
+    page = httpx.get(f"{shared_server.url}/")
+    assert page.headers["content-type"].startswith("text/html")
+    assert "viser/" in page.text
+    for path in set(re.findall(r"(?:src|href)=\"(static/[^\"]+)\"", page.text)):
+        assert httpx.get(f"{shared_server.url}/{path}").status_code == 200, path

@@ -1,0 +1,161 @@
+import http.client
+import pickle
+import socket
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from serving import Server, assert_problem, write_room
+
+BAD_NAMES = [
+    "../up.npz", "%2e%2e%2fup.npz", "..%5cup.npz", "a%2fb.npz", "%2fetc%2fup.npz", ".hidden", "..", "%2e%2e",
+    "nul%00.npz", "c%3a.npz", "trailing.", "x" * 250, "line%0abreak", "tilde%2f~",
+]  # fmt: skip
+
+
+def files(folder: Path) -> list[str]:
+    """Everything below the folder's parent: what was written, wherever it went."""
+    return sorted(str(path.relative_to(folder.parent)) for path in folder.parent.rglob("*"))
+
+
+def test_an_uploaded_recording_is_listed_plays_and_can_be_deleted(server: Server, tmp_path: Path) -> None:
+    source = write_room(tmp_path / "source.npz")
+    response = server.http.put("/recordings/my room.npz", content=source.read_bytes())
+    assert response.status_code == 201
+    entry = response.json()
+    assert entry == server.get("/recordings")["recordings"][0]
+    assert (entry["name"], entry["size"]) == ("my room.npz", source.stat().st_size)
+    assert (server.folder / "my room.npz").read_bytes() == source.read_bytes()
+    assert server.play(server.folder / "my room.npz")["source"]["kind"] == "recording"
+    assert server.http.delete("/recordings/my room.npz").status_code == 204
+    assert server.get("/recordings")["recordings"] == []
+    assert_problem(server.http.delete("/recordings/my room.npz"), 404)
+
+
+def test_a_real_bag_is_taken_and_plays(server: Server, hokuyo: Path) -> None:
+    with hokuyo.open("rb") as file:
+        assert server.http.put("/recordings/demo.bag", content=file).status_code == 201
+    frame = server.play(server.folder / "demo.bag")
+    assert frame["n_beams"] == 681
+    assert frame["corners"]
+
+
+def test_an_existing_recording_is_replaced_only_when_asked_for(
+    server: Server, room: Path, tmp_path: Path
+) -> None:
+    old, new = room.read_bytes(), write_room(tmp_path / "new.npz", scans=3).read_bytes()
+    assert_problem(server.http.put("/recordings/room.npz", content=new), 409)
+    assert room.read_bytes() == old
+    assert server.http.put("/recordings/room.npz?overwrite=true", content=new).status_code == 201
+    assert room.read_bytes() == new
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_too_large_an_upload_is_refused_and_leaves_nothing(
+    make_server: Callable[..., Server], chunked: bool
+) -> None:
+    server = make_server(max_bytes=100_000)
+    body = b"x" * 150_000
+    content = iter([body[:90_000], body[90_000:]]) if chunked else body
+    problem = assert_problem(server.http.put("/recordings/big.npz", content=content), 413)
+    assert "100000" in problem["detail"]
+    assert files(server.folder) == ["recordings"]
+    assert server.get("/recordings")["max_bytes"] == 100_000
+
+
+class Malicious:
+    def __reduce__(self) -> tuple:
+        return (Path.touch, (Path("pwned"),))
+
+
+def pickled_npz(path: Path) -> bytes:
+    with path.open("wb") as file:
+        np.savez(file, ranges=np.array([Malicious()], dtype=object), bearings=np.zeros(1))
+    data = path.read_bytes()
+    path.unlink()
+    return data
+
+
+@pytest.mark.parametrize("kind", ["garbage", "empty", "pickle", "raw pickle", "truncated"])
+def test_what_no_reader_takes_is_refused_with_its_reason_and_leaves_nothing(
+    server: Server, tmp_path: Path, kind: str
+) -> None:
+    body = {
+        "garbage": np.random.default_rng(0).bytes(50_000),
+        "empty": b"",
+        "pickle": pickled_npz(tmp_path / "pickled.npz"),
+        "raw pickle": pickle.dumps(Malicious()),
+        "truncated": write_room(tmp_path / "whole.npz").read_bytes()[:3000],
+    }[kind]
+    for path in tmp_path.glob("*.npz"):
+        path.unlink()
+    before = server.next_frame()
+    problem = assert_problem(server.http.put("/recordings/bad.bag", content=body), 422)
+    assert "bad.bag" in problem["detail"] or "pickle" in problem["detail"]
+    assert ".upload" not in problem["detail"]
+    assert files(server.folder) == ["recordings"]
+    assert not Path("pwned").exists()
+    after = server.next_frame()
+    assert after["source"]["kind"] == "simulation"
+    assert after["sequence"] > before["sequence"]
+
+
+@pytest.mark.parametrize("name", BAD_NAMES)
+@pytest.mark.parametrize("method", ["PUT", "DELETE"])
+def test_a_name_that_is_no_plain_file_name_touches_nothing(
+    shared_server: Server, name: str, method: str
+) -> None:
+    folder = shared_server.folder
+    before, body = files(folder), (folder / "room.npz").read_bytes()
+    connection = http.client.HTTPConnection("127.0.0.1", shared_server.port)
+    connection.request(method, f"/api/v1/recordings/{name}", body=body if method == "PUT" else None)
+    response = connection.getresponse()
+    assert response.status in (404, 405, 422)
+    assert response.headers["content-type"] == "application/problem+json"
+    connection.close()
+    assert files(folder) == before
+
+
+def test_an_upload_that_breaks_off_leaves_nothing(server: Server, room: Path) -> None:
+    before = files(server.folder)
+    with socket.create_connection(("127.0.0.1", server.port)) as connection:
+        head = f"PUT /api/v1/recordings/half.npz HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
+        connection.sendall(f"{head}Content-Length: 1000000\r\n\r\n".encode() + room.read_bytes()[:100_000])
+        wait_for(lambda: files(server.folder) != before)
+    wait_for(lambda: files(server.folder) == before)
+
+
+def wait_for(holds: Callable[[], bool], seconds: float = 10) -> None:
+    """For what no event tells of: what is on the disk."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_a_recording_given_at_the_start_plays_and_is_listed_but_not_deleted(
+    make_server: Callable[..., Server], tmp_path: Path
+) -> None:
+    given = write_room(tmp_path / "elsewhere.npz")
+    server = make_server(recording=given)
+    assert server.next_frame()["source"]["kind"] == "recording"
+    assert [r["name"] for r in server.get("/recordings")["recordings"]] == ["elsewhere.npz"]
+    assert_problem(server.http.delete("/recordings/elsewhere.npz"), 409)
+    assert_problem(server.http.put("/recordings/elsewhere.npz?overwrite=1", content=given.read_bytes()), 409)
+    assert given.exists()
+    server.change("PUT", "/source", {"kind": "simulation"})
+    assert server.play(given)["source"]["kind"] == "recording"
+
+
+def test_hidden_files_and_other_folders_are_not_listed_but_bags_are(server: Server, room: Path) -> None:
+    (server.folder / ".hidden").write_text("x")
+    (server.folder / "folder").mkdir()
+    bag = server.folder / "bag"
+    bag.mkdir()
+    (bag / "bag_0.db3").write_bytes(b"SQLite format 3\0")
+    assert [r["name"] for r in server.get("/recordings")["recordings"]] == ["bag", "room.npz"]
+    assert server.http.delete("/recordings/bag").status_code == 204
+    assert_problem(server.http.delete("/recordings/folder"), 404)
+    assert (server.folder / "folder").is_dir()

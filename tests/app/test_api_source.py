@@ -1,0 +1,239 @@
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from mcap_ros2.writer import Writer
+from serving import Json, Server, Stream, assert_problem, write_room
+
+from app.frame import Taken
+from app.player import Player
+from app.sources import RecordingSource
+
+LASER_SCAN = """std_msgs/Header header
+float32 angle_min
+float32 angle_max
+float32 angle_increment
+float32 time_increment
+float32 scan_time
+float32 range_min
+float32 range_max
+float32[] ranges
+float32[] intensities
+================================================================================
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+
+
+def write_two_lidars(path: Path) -> Path:
+    """A bag with the topics /front and /rear, written by a library of its own."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        schema = writer.register_msgdef("sensor_msgs/msg/LaserScan", LASER_SCAN)
+        for i in range(5):
+            for topic, beams in (("/front", 360), ("/rear", 180)):
+                step = 2 * 3.14159265 / beams
+                message = {
+                    "header": {"stamp": {"sec": 10 + i, "nanosec": 0}, "frame_id": "laser"},
+                    "angle_min": -3.14159265, "angle_max": 3.14159265 - step, "angle_increment": step,
+                    "time_increment": 0.0, "scan_time": 1.0, "range_min": 0.1, "range_max": 10.0,
+                    "ranges": [2.0] * beams, "intensities": [],
+                }  # fmt: skip
+                writer.write_message(topic, schema, message, log_time=i * 10**9, publish_time=i * 10**9)
+        writer.finish()
+    return path
+
+
+def recorded(frame: Json) -> bool:
+    return frame["source"]["kind"] == "recording"
+
+
+def test_a_recording_plays_from_where_it_is_told_to(server: Server, room: Path) -> None:
+    order = {"kind": "recording", "name": "room.npz", "index": 12, "paused": True}
+    with server.stream() as stream:
+        answer = server.change("PUT", "/source", order)
+        state = stream.state(lambda s: s["source"]["complete"])["source"]
+        server.change("PATCH", "/source", {"index": 12})  # shown again, now that this is sure to be seen
+        frame = stream.frame(recorded)
+    assert answer["kind"] == "recording"
+    assert (answer["recording"], answer["format"]) == ("room.npz", "NumPy .npz")
+    assert (frame["source"]["index"], frame["stamp"]) == (12, pytest.approx(101.2))
+    assert (state["state"], state["count"], state["duration"]) == ("paused", 30, pytest.approx(2.9))
+    assert state["time"] == pytest.approx(1.2)
+    assert state["error"] is None
+
+
+def wait_until_complete(stream: Stream) -> None:
+    stream.state(lambda s: s["source"]["complete"])
+
+
+def test_stepping_and_seeking_show_the_scan_asked_for_and_stay_inside(server: Server, room: Path) -> None:
+    with server.stream() as stream:
+        server.change("PUT", "/source", {"kind": "recording", "name": "room.npz", "paused": True})
+        wait_until_complete(stream)
+        for method, path, body, index in [
+            ("POST", "/source/step", {"by": 1}, 1),
+            ("POST", "/source/step", {"by": 5}, 6),
+            ("POST", "/source/step", {"by": -2}, 4),
+            ("PATCH", "/source", {"index": 20}, 20),
+            ("POST", "/source/step", {"by": 600}, 29),
+            ("PATCH", "/source", {"index": 10**9}, 29),
+            ("POST", "/source/step", {"by": -600}, 0),
+        ]:
+            answer = server.change(method, path, body)
+            assert (answer["index"], answer["state"]) == (index, "paused")
+            frame = stream.frame(lambda f, index=index: recorded(f) and f["source"]["index"] == index)
+            assert frame["stamp"] == pytest.approx(100 + 0.1 * index)
+
+
+def test_stepping_pauses_what_plays(server: Server, room: Path) -> None:
+    server.play(room)
+    assert server.change("POST", "/source/step", {})["state"] == "paused"
+    assert server.change("PATCH", "/source", {"state": "playing"})["state"] == "playing"
+
+
+@pytest.mark.parametrize("speed", [1, 4])
+def test_a_recording_keeps_the_pace_of_its_stamps(tmp_path: Path, speed: int) -> None:
+    room = write_room(tmp_path / "paced.npz", scans=21, period=0.1)
+    handed_over: list[Taken] = []
+    ended = threading.Event()
+    player = Player(
+        RecordingSource(room),
+        hand_over=handed_over.append,
+        is_idle=lambda: True,
+        changed=lambda: player.describe()["state"] == "ended" and ended.set(),
+    )
+    player.control(speed=speed, loop=False)
+    player.start()
+    assert ended.wait(20)
+    player.close()
+    assert [taken.position["index"] for taken in handed_over] == list(range(21))
+    took = handed_over[-1].handed_over - handed_over[0].handed_over
+    assert took == pytest.approx(2.0 / speed, rel=0.1)
+
+
+def test_at_the_end_it_stops_and_playing_on_starts_again(server: Server) -> None:
+    room = write_room(server.folder / "short.npz", scans=4, period=0.02)
+    server.change("PATCH", "/source", {"loop": False})
+    with server.stream() as stream:
+        server.change("PUT", "/source", {"kind": "recording", "name": room.name})
+        ended = stream.state(lambda s: s["source"]["state"] == "ended")["source"]
+        assert ended["index"] == 3
+        server.change("PATCH", "/source", {"state": "playing"})
+        assert stream.frame(lambda f: f["source"]["index"] == 0)
+        stream.state(lambda s: s["source"]["state"] == "ended")
+        server.change("PATCH", "/source", {"loop": True, "state": "playing"})
+        for index in (3, 0, 3, 0):
+            stream.frame(lambda f, index=index: f["source"]["index"] == index)
+
+
+def test_as_fast_as_possible_drops_nothing(server: Server) -> None:
+    room = write_room(server.folder / "long.npz", scans=400)
+    seen: list[int] = []
+    server.change("PATCH", "/source", {"speed": 0, "loop": False, "state": "paused"})
+    with server.stream() as stream:
+        server.change("PUT", "/source", {"kind": "recording", "name": room.name, "paused": True})
+        wait_until_complete(stream)
+        server.runtime.frame_listeners.append(lambda f: seen.append(f.taken.position["index"]))
+        started = time.monotonic()
+        server.change("PATCH", "/source", {"state": "playing"})
+        stream.frame(lambda f: f["source"]["index"] == 399)
+        assert time.monotonic() - started < 20  # 40 s by its stamps
+    assert seen == list(range(1, 400))
+
+
+def test_the_simulation_steps_back_to_the_same_scan(server: Server) -> None:
+    with server.stream() as stream:
+        stream.frame(lambda f: f["source"]["index"] >= 3)
+        at = server.change("PATCH", "/source", {"state": "paused"})["index"]
+        server.change("PATCH", "/source", {"index": at})
+        shown = stream.frame(lambda f: f["source"]["index"] == at)
+        server.change("POST", "/source/step", {"by": -2})
+        before = stream.frame(lambda f: f["source"]["index"] == at - 2)
+        server.change("POST", "/source/step", {"by": 2})
+        again = stream.frame(lambda f: f["source"]["index"] == at)
+    assert again["points"] == shown["points"] != before["points"]
+    assert server.get("/source")["count"] is None
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "status"),
+    [("missing.bag", None, 404), ("bad.bag", b"#ROSBAG V2.0\n but not really", 422), ("empty.csv", b"", 422)],
+)
+def test_what_cannot_be_played_leaves_playing_what_played(
+    server: Server, room: Path, name: str, content: bytes | None, status: int
+) -> None:
+    if content is not None:
+        (server.folder / name).write_bytes(content)
+    server.play(room)
+    before = server.get("/source")
+    assert_problem(server.http.put("/source", json={"kind": "recording", "name": name}), status)
+    after = server.get("/source")
+    assert {k: after[k] for k in ("recording", "state", "error")} == {
+        k: before[k] for k in ("recording", "state", "error")
+    }
+    assert server.next_frame()["source"]["kind"] == "recording"
+
+
+def test_of_several_lidars_one_is_to_be_chosen(server: Server) -> None:
+    bag = write_two_lidars(server.folder / "two.mcap")
+    assert server.http.put("/recordings/again.mcap", content=bag.read_bytes()).status_code == 201
+    body = {"kind": "recording", "name": bag.name}
+    problem = assert_problem(server.http.put("/source", json=body), 409)
+    assert problem["topics"] == ["/front", "/rear"]
+    assert server.get("/source")["kind"] == "simulation"
+    assert_problem(server.http.put("/source", json=body | {"topic": "/nose"}), 409)
+    assert server.play(bag, topic="/rear")["n_beams"] == 180
+    assert server.get("/source")["topic"] == "/rear"
+
+
+def test_a_file_that_breaks_off_plays_as_far_as_it_goes(server: Server, hokuyo: Path) -> None:
+    cut = server.folder / "cut.bag"
+    data = hokuyo.read_bytes()
+    cut.write_bytes(data[: len(data) // 2])
+    with server.stream() as stream:
+        server.change("PUT", "/source", {"kind": "recording", "name": cut.name})
+        state = stream.state(lambda s: s["source"]["complete"])["source"]
+    assert 0 < state["count"] < 360
+    assert state["error"] or state["notes"]
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "body"),
+    [
+        ("PUT", "/source", {"kind": "camera"}),
+        ("PUT", "/source", {"kind": "recording"}),
+        ("PUT", "/source", {"kind": "recording", "name": "../../etc/passwd"}),
+        ("PUT", "/source", {"kind": "recording", "name": "room.npz", "index": -1}),
+        ("PUT", "/source", {"kind": "simulation", "name": "room.npz"}),
+        ("PATCH", "/source", {"speed": 0.05}),
+        ("PATCH", "/source", {"speed": 101}),
+        ("PATCH", "/source", {"speed": -1}),
+        ("PATCH", "/source", {"speed": "fast"}),
+        ("PATCH", "/source", {"state": "ended"}),
+        ("PATCH", "/source", {"index": 1.5}),
+        ("PATCH", "/source", {"indx": 1}),
+        ("POST", "/source/step", {"by": 601}),
+        ("POST", "/source/step", {"by": "1"}),
+        ("PUT", "/source", []),
+    ],
+)
+def test_bad_orders_are_refused(shared_server: Server, method: str, path: str, body: object) -> None:
+    before = shared_server.get("/source")
+    assert_problem(shared_server.http.request(method, path, json=body), 422)
+    after = shared_server.get("/source")
+    assert [after[k] for k in ("kind", "speed", "loop")] == [before[k] for k in ("kind", "speed", "loop")]
+
+
+def test_a_speed_that_is_not_finite_is_refused(shared_server: Server) -> None:
+    for number in ("NaN", "Infinity"):
+        response = shared_server.http.patch(
+            "/source", content=f'{{"speed": {number}}}', headers={"content-type": "application/json"}
+        )
+        assert_problem(response, 422)

@@ -1,0 +1,160 @@
+import asyncio
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from pathlib import Path
+
+import httpx
+import pytest
+import websockets
+from serving import ROOT, Server, strict_json, write_room
+
+from app.runtime import Slot
+from app.serve import SEND_BUFFER
+from app.stream import Mailbox
+
+RECEIVE_BUFFER = 8192
+
+
+def test_first_comes_the_state_then_the_newest_frame(server: Server) -> None:
+    server.next_frame()
+    with server.stream() as stream:
+        state, frame = stream.message(), stream.message()
+    assert state["type"] == "state"
+    assert state.keys() == {"type", "settings", "source", "selection", "ready"}
+    assert state["settings"] == server.get("/settings")
+    assert state["source"].keys() == server.get("/source").keys()
+    assert frame["type"] == "frame"
+    assert frame.keys() - {"type", "points"} == server.get("/frame").keys()
+
+
+def test_every_change_is_told_to_every_client(server: Server) -> None:
+    with server.stream() as one, server.stream() as other:
+        for method, path, body, holds in [
+            (
+                "PATCH",
+                "/settings",
+                {"view": {"theme": "light"}},
+                lambda s: s["settings"]["view"]["theme"] == "light",
+            ),
+            ("PATCH", "/source", {"speed": 2}, lambda s: s["source"]["speed"] == 2),
+            ("PATCH", "/source", {"state": "paused"}, lambda s: s["source"]["state"] == "paused"),
+            ("PUT", "/source", {"kind": "simulation"}, lambda s: s["source"]["state"] == "playing"),
+        ]:
+            server.change(method, path, body)
+            assert one.state(holds)
+            assert other.state(holds)
+
+
+def test_a_mailbox_holds_one_frame_the_newest() -> None:
+    class Frame:
+        def __init__(self, n: int) -> None:
+            self.text = json.dumps({"n": n})
+
+    async def scenario() -> None:
+        mailbox = Mailbox(points=False)
+        for n in range(5):
+            mailbox.put_frame(Frame(n))
+        mailbox.put_state()
+        mailbox.put_state()
+        assert await mailbox.take(lambda: "state") == ["state", '{"type":"frame","n": 4}']
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(mailbox.take(lambda: "state"), 0.05)
+
+    asyncio.run(scenario())
+
+
+def test_a_slot_counts_what_it_drops_but_not_the_same_scan_again() -> None:
+    class Taken:
+        def __init__(self, scan: object) -> None:
+            self.scan = scan
+
+    slot, scans = Slot(), [object(), object(), object()]
+    for scan in (scans[0], scans[0], scans[1], scans[2]):
+        slot.put(Taken(scan))
+    assert slot.dropped == 2
+    assert slot.take().scan is scans[2]
+    assert not slot.idle
+    slot.done()
+    assert slot.idle
+
+
+def test_a_slow_client_gets_fewer_frames_and_then_no_old_ones(server: Server) -> None:
+    """It stops reading while hundreds of frames pass; what then comes is what fits the sockets, then the newest."""
+    write_room(server.folder / "room.npz", scans=300)
+    server.change("PATCH", "/source", {"speed": 0})
+    server.change("PUT", "/source", {"kind": "recording", "name": "room.npz"})
+    slow_socket = socket.socket()
+    slow_socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
+    slow_socket.connect(("127.0.0.1", server.port))
+    passed = threading.Event()
+    with server.stream(sock=slow_socket, max_queue=1, close_timeout=0.1) as slow:
+        stalled_at = slow.frame()["sequence"]
+        server.runtime.frame_listeners.append(lambda f: f.sequence > stalled_at + 400 and passed.set())
+        assert passed.wait(60)
+        resumed_at = server.runtime.frame.sequence
+        late = 0
+        while strict_json(text := slow.websocket.recv(timeout=30)).get("sequence", 0) < resumed_at:
+            late += len(text)
+    in_kernels, in_client = 2 * SEND_BUFFER + 2 * RECEIVE_BUFFER, 65536
+    assert late <= in_kernels + in_client + 3 * len(text), "more than the buffers hold came late"
+    assert late < 400 * len(text) / 20
+
+
+def test_twenty_clients_get_every_frame_in_order_and_memory_does_not_grow(
+    tmp_path: Path, free_port: Callable[[], int]
+) -> None:
+    """In a process of its own, whose memory is its own."""
+    write_room(tmp_path / "room.npz")
+    port = free_port()
+    command = [sys.executable, "-m", "app.cli", "serve", "--port", str(port), "--recordings", str(tmp_path)]
+    environment = os.environ | {"PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE) as process:
+        try:
+            assert b"serves" in process.stdout.readline()
+            asyncio.run(twenty_clients(f"127.0.0.1:{port}"))
+        finally:
+            process.terminate()
+
+
+async def twenty_clients(address: str) -> None:
+    async with httpx.AsyncClient(base_url=f"http://{address}/api/v1") as http, asyncio.TaskGroup() as tasks:
+        clients = [
+            await websockets.connect(f"ws://{address}/api/v1/stream", max_size=None) for _ in range(20)
+        ]
+        await frames(clients[0], 3)
+        memory = [(await http.get("/health")).json()]
+        for _ in range(2):
+            seen = [tasks.create_task(frames(client, 20)) for client in clients]
+            for sequences in [await task for task in seen]:
+                assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
+            memory.append((await http.get("/health")).json())
+        assert [m["clients"] for m in memory] == [20, 20, 20]
+        grown = memory[2]["memory_bytes"] - memory[1]["memory_bytes"]
+        assert grown < 5e6, "2 s of frames queued for 20 clients would be 6 MB"
+        for client in clients:
+            await client.close()
+
+
+async def frames(client: websockets.ClientConnection, count: int) -> list[int]:
+    """Sequence numbers of the next frames."""
+    sequences: list[int] = []
+    while len(sequences) < count:
+        message = json.loads(await asyncio.wait_for(client.recv(), 60))
+        if message["type"] == "frame":
+            sequences.append(message["sequence"])
+    return sequences
+
+
+def test_a_client_that_goes_is_forgotten(server: Server) -> None:
+    with server.stream() as stream:
+        stream.frame()
+        for _ in range(5):
+            with server.stream() as other:
+                other.message()
+        other.websocket.socket.close()
+        stream.frame(lambda _: server.get("/health")["clients"] == 1)

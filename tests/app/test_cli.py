@@ -1,0 +1,262 @@
+"""The command as people run it: processes of their own, and what they leave behind."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import httpx
+import numpy as np
+import pyarrow.parquet
+import pytest
+from serving import ROOT, write_room
+
+from app.serve import listen
+from lidarcore import ExtractionSettings, compare, open_recording
+
+ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("LIDARCORE")}
+
+
+def run(*arguments: object, timeout: float = 120) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "app.cli", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
+
+
+def assert_refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
+    """Exit code 2 and one sentence that has these words."""
+    assert result.returncode == 2, result
+    assert result.stdout == ""
+    assert result.stderr.startswith("lidarcore: ")
+    assert len(result.stderr.strip().splitlines()) == 1
+    for word in words:
+        assert word in result.stderr
+
+
+def test_help_is_instant_and_names_every_command() -> None:
+    took = []
+    for _ in range(3):
+        started = time.perf_counter()
+        result = run("--help")
+        took.append(time.perf_counter() - started)
+    assert min(took) < 0.5
+    for command in ("serve", "process", "info", "bench"):
+        assert command in result.stdout
+        assert run(command, "--help").returncode == 0
+
+
+def test_info_says_what_is_in_a_recording(hokuyo: Path) -> None:
+    result = run("info", hokuyo)
+    assert result.returncode == 0, result.stderr
+    scans = list(open_recording(hokuyo))
+    for line in (
+        "format +ROS 1 bag",
+        r"topic +/scan",
+        f"scans +{len(scans)}",
+        "beams per scan +681 to 681",
+        "duration +35.8 s",
+    ):
+        assert re.search(line, result.stdout), (line, result.stdout)
+
+
+@pytest.fixture(scope="module")
+def tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The same recording processed into every format, by two methods."""
+    folder = tmp_path_factory.mktemp("tables")
+    room = write_room(folder / "room.npz", scans=7)
+    paths = {suffix: folder / f"out.{suffix}" for suffix in ("csv", "parquet", "geojson")}
+    for path in paths.values():
+        result = run(
+            "process", room, "-o", path, "--fitter", "cwlf", "--fitter", "ml", "--set", "min_points=9"
+        )
+        assert result.returncode == 0, result.stderr
+        assert "7 scans" in result.stdout
+    return paths
+
+
+def expected(folder: Path) -> Iterator[dict]:
+    """What the library finds, as rows."""
+    settings = ExtractionSettings(min_points=9)
+    for number, scan in enumerate(open_recording(folder / "room.npz")):
+        for fitter, features in compare(scan, settings, ("cwlf", "ml")).items():
+            for i in range(len(features.segments)):
+                line = features.segments.lines[i]
+                yield {"scan": number, "stamp": scan.stamp, "fitter": fitter, "kind": "segment", "id": i,
+                       "alpha": line.alpha, "r": line.r, "x_start": features.segments.start[i, 0],
+                       "var_r": line.covariance_consistent[1, 1]}  # fmt: skip
+            for i in range(len(features.corners)):
+                x, y = features.corners.xy[i]
+                yield {"scan": number, "stamp": scan.stamp, "fitter": fitter, "kind": "corner", "id": i,
+                       "x": x, "y": y, "cov_xy": features.corners.covariance[i, 0, 1],
+                       "segment_2": features.corners.segments[i, 1]}  # fmt: skip
+
+
+def assert_rows(rows: list[dict], folder: Path) -> None:
+    for row, wanted in zip(rows, expected(folder), strict=True):
+        assert {name: row[name] for name in wanted} == wanted
+
+
+def test_a_csv_table_holds_every_scan(tables: dict[str, Path]) -> None:
+    def typed(name: str, text: str) -> object:
+        return text if name in ("fitter", "kind", "covariance") else float(text) if text else None
+
+    with tables["csv"].open(newline="") as file:
+        rows = [{name: typed(name, text) for name, text in row.items()} for row in csv.DictReader(file)]
+    assert_rows(rows, tables["csv"].parent)
+    assert all(row["x"] is None for row in rows if row["kind"] == "segment")
+
+
+def test_a_parquet_table_holds_every_scan(tables: dict[str, Path]) -> None:
+    assert_rows(pyarrow.parquet.read_table(tables["parquet"]).to_pylist(), tables["parquet"].parent)
+
+
+def test_a_geojson_collection_holds_every_scan(tables: dict[str, Path]) -> None:
+    collection = json.loads(tables["geojson"].read_text())
+    assert collection["type"] == "FeatureCollection"
+    rows = []
+    for feature in collection["features"]:
+        assert feature["type"] == "Feature"
+        kind, coordinates = feature["geometry"]["type"], np.array(feature["geometry"]["coordinates"])
+        if kind == "LineString":
+            assert coordinates.shape == (2, 2)
+            rows.append(feature["properties"] | {"x_start": coordinates[0, 0]})
+        else:
+            rows.append(feature["properties"] | dict(zip("xy", coordinates, strict=True)))
+    assert_rows(rows, tables["geojson"].parent)
+
+
+def test_processing_what_breaks_leaves_no_file_and_the_old_one_as_it_was(tmp_path: Path) -> None:
+    garbage = tmp_path / "garbage.bag"
+    garbage.write_bytes(b"#ROSBAG V2.0\n" + bytes(range(256)) * 20)
+    old = tmp_path / "old.csv"
+    old.write_text("precious")
+    room = write_room(tmp_path / "room.npz", scans=2)
+    before = sorted(tmp_path.iterdir())
+    assert_refused(run("process", garbage, "-o", tmp_path / "new.csv"), "garbage.bag")
+    assert_refused(run("process", garbage, "-o", old), "garbage.bag")
+    assert_refused(run("process", room, "-o", tmp_path / "new.xlsx"), ".parquet")
+    assert_refused(run("process", room, "-o", tmp_path / "missing" / "new.csv"), "missing")
+    assert_refused(run("process", tmp_path / "none.bag", "-o", old), "none.bag")
+    assert_refused(run("process", room, "-o", old, "--topic", "/nose"), "/nose")
+    assert sorted(tmp_path.iterdir()) == before
+    assert old.read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("gap=-1", ["extraction.gap", "0.02"]),
+        ("gap=wide", ["extraction.gap"]),
+        ("gapp=1", ["extraction.gapp"]),
+        ("view.theme=pink", ["view.theme"]),
+        ("noise.sigma_range=NaN", ["sigma_range"]),
+        ("fitter=magic", ["magic", "wctls"]),
+    ],
+)
+def test_a_bad_setting_is_named(tmp_path: Path, setting: str, words: list[str]) -> None:
+    assert_refused(run("process", "any.bag", "-o", tmp_path / "x.csv", "--set", setting), *words)
+
+
+def test_settings_come_from_a_file_and_from_the_line(tmp_path: Path) -> None:
+    room = write_room(tmp_path / "room.npz", scans=2)
+    file = tmp_path / "settings.json"
+    file.write_text(
+        json.dumps({"extraction": {"fitter": "utls", "covariance": "published", "min_length": 9}})
+    )
+    output = tmp_path / "out.csv"
+    assert run("process", room, "-o", output, "--settings", file, "--set", "min_length=1").returncode == 0
+    with output.open(newline="") as csv_file:
+        rows = list(csv.DictReader(csv_file))
+    assert {(row["fitter"], row["covariance"]) for row in rows} == {("utls", "published")}
+    assert len(rows) == 16
+    file.write_text('{"extraction": ')
+    assert_refused(run("process", room, "-o", output, "--settings", file))
+    assert_refused(run("process", room, "-o", output, "--settings", tmp_path / "none.json"), "none.json")
+
+
+class Serving:
+    """`lidarcore serve` in a process of its own."""
+
+    def __init__(self, *arguments: object) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "app.cli", "serve", *map(str, arguments)],
+            cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        line = self.process.stdout.readline()
+        match = re.search(r"http://\S+", line)
+        assert match, self.process.communicate()
+        self.url = match[0]
+
+    def interrupt(self) -> tuple[float, str]:
+        """Press Ctrl-C; how long it takes to end, and what it says about it."""
+        started = time.perf_counter()
+        self.process.send_signal(signal.SIGINT)
+        _, said = self.process.communicate(timeout=20)
+        return time.perf_counter() - started, said
+
+
+@pytest.fixture
+def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
+    started: list[Serving] = []
+
+    def start(*arguments: object) -> Serving:
+        started.append(Serving(*arguments, "--recordings", tmp_path / "recordings"))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.process.kill()
+        one.process.communicate()
+
+
+def test_serve_prints_its_address_plays_the_recording_and_ends_on_ctrl_c(
+    tmp_path: Path, serving: Callable[..., Serving]
+) -> None:
+    room = write_room(tmp_path / "given.npz")
+    server = serving(room, "--port", 0, "--set", "fitter=cwlf")
+    assert re.fullmatch(r"http://127\.0\.0\.1:[1-9]\d*/", server.url)
+    with httpx.Client(base_url=f"{server.url}api/v1", timeout=60) as http:
+        assert http.get("/source").json()["recording"] == "given.npz"
+        assert http.get("/settings").json()["extraction"]["fitter"] == "cwlf"
+    seconds, said = server.interrupt()
+    assert seconds < 3
+    assert said == ""
+    assert server.process.returncode == 0
+
+
+def test_a_busy_port_is_said_to_be(serving: Callable[..., Serving], free_port: Callable[[], int]) -> None:
+    with listen("127.0.0.1", 0) as listening:
+        port = listening.getsockname()[1]
+        assert_refused(run("serve", "--port", port), str(port), "in use", "--port")
+    assert_refused(run("serve", "--host", "203.0.113.1"), "203.0.113.1")
+    assert_refused(run("serve", "--host", "no.such.host.invalid"), "no.such.host.invalid")
+
+
+def test_what_cannot_be_served_is_said_before_anything_listens(tmp_path: Path) -> None:
+    assert_refused(run("serve", "--port", 0, tmp_path / "none.bag"), "none.bag")
+    (tmp_path / "empty.bag").touch()
+    assert_refused(run("serve", "--port", 0, tmp_path / "empty.bag"), "empty")
+
+
+def test_beyond_this_machine_a_token_is_demanded(serving: Callable[..., Serving]) -> None:
+    server = serving("--port", 0, "--host", "0.0.0.0")
+    port, token = re.fullmatch(r"http://[^/]+:(\d+)/\?token=(\S{20,})", server.url).groups()
+    url = f"http://127.0.0.1:{port}/api/v1/health"
+    assert httpx.get(url, timeout=60).status_code == 401
+    assert httpx.get(url, headers={"authorization": f"Bearer {token}"}).status_code == 200
+
+
+def test_a_token_of_ones_own_is_demanded_anywhere(serving: Callable[..., Serving]) -> None:
+    server = serving("--port", 0, "--token", "my-token")
+    assert server.url.endswith("/?token=my-token")
+    with httpx.Client(timeout=60, follow_redirects=True) as browser:
+        assert browser.get(server.url.partition("?")[0]).status_code == 401
+        assert browser.get(server.url).status_code == 200
+    result = run("serve", "--token", "no spaces")
+    assert result.returncode == 2
+    assert "Traceback" not in result.stderr

@@ -1,0 +1,236 @@
+"""The one place that rests on private parts of viser 1.1.1: if a test here fails, the scene is broken."""
+
+import re
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import httpx
+import msgspec
+import numpy as np
+import psutil
+import pytest
+import viser
+import zstandard
+from serving import CORNERS, Json, Server
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+NODES = {"/grid", "/labels", "/points", "/segments", "/corners", "/sensor", "/selection"} | {
+    "/ellipses/fill", "/ellipses/outline", "/rejected/points", "/rejected/crosses",
+}  # fmt: skip
+
+
+class Viewer:
+    """What viser's browser client does with the messages it gets: keep each node's newest properties."""
+
+    def __init__(self, websocket: ClientConnection) -> None:
+        self.websocket = websocket
+        self.nodes: dict[str, Json] = {}
+        self.types: set[str] = set()
+
+    def read(self) -> list[Json]:
+        """The next window of messages, taken into account."""
+        messages = decode(self.websocket.recv(timeout=20))
+        for message in messages:
+            self.types.add(message["type"])
+            name = message.get("name")
+            if name is not None and "props" in message:
+                self.nodes[name] = message["props"] | {"visible": True}
+            elif message["type"] == "SceneNodeUpdateMessage":
+                self.nodes[name].update(message["updates"])
+            elif message["type"] == "SetSceneNodeVisibilityMessage":
+                self.nodes[name]["visible"] = message["visible"]
+        return messages
+
+    def until(self, holds: Any) -> None:
+        while not holds():
+            self.read()
+
+    def array(self, node: str, name: str, kind: str = "<f4") -> np.ndarray:
+        return np.frombuffer(self.nodes[node][name], kind)
+
+    def send(self, **message: Any) -> None:
+        self.websocket.send(msgspec.msgpack.encode(message))
+
+
+def decode(window: bytes) -> list[Json]:
+    """viser's wire format: sizes, a compressed msgpack, then the arrays it points into, aligned to 8 bytes."""
+    size, compressed = struct.unpack_from("<QQ", window)
+    data = msgspec.msgpack.decode(zstandard.decompress(window[16 : 16 + compressed], size))
+    arrays, at = [], 16 + compressed
+    for length in data["binaryBufferLengths"]:
+        at += -at % 8
+        arrays.append(window[at : at + length])
+        at += length
+
+    def filled(value: Any) -> Any:
+        if isinstance(value, dict) and "__binary_index" in value:
+            return arrays[value["__binary_index"]]
+        if isinstance(value, dict):
+            return {key: filled(item) for key, item in value.items()}
+        return [filled(item) for item in value] if isinstance(value, list) else value
+
+    return [filled(message) for message in data["messages"]]
+
+
+@contextmanager
+def viewing(server: Server) -> Iterator[Viewer]:
+    address = f"ws://127.0.0.1:{server.port}/viser"
+    with connect(address, subprotocols=[f"viser-v{viser.__version__}"], max_size=None) as websocket:
+        yield Viewer(websocket)
+
+
+def test_the_version_is_the_one_that_the_mount_was_made_for() -> None:
+    assert viser.__version__ == "1.1.1"
+
+
+def test_a_client_gets_the_whole_scene_and_then_every_frame(server: Server, room) -> None:
+    server.play(room, paused=True)
+    points = np.array(server.get("/frame", points=True)["points"])
+    with viewing(server) as viewer:
+        viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
+        assert viewer.nodes.keys() >= NODES
+        shown = viewer.array("/points", "points").reshape(-1, 3)
+        np.testing.assert_allclose(shown[:, :2], points, atol=1e-4)
+        assert viewer.nodes["/points"]["precision"] == "float32"
+        discs = viewer.array("/corners", "batched_positions").reshape(-1, 3)[:, :2]
+        assert np.linalg.norm(discs[:, None] - CORNERS, axis=2).min(axis=1).max() < 0.01
+        server.change("POST", "/source/step", {"by": 1})
+        viewer.until(lambda: not np.array_equal(viewer.array("/points", "points").reshape(-1, 3), shown))
+
+
+def test_compare_mode_draws_every_method_in_its_colour(server: Server, room) -> None:
+    with viewing(server) as viewer:
+        server.change("PATCH", "/settings", {"view": {"compare": True, "methods": ["cwlf", "wctls"]}})
+        server.play(room, paused=True)
+        viewer.until(
+            lambda: (
+                "/ellipses/fill" in viewer.nodes
+                and len(viewer.array("/ellipses/fill", "batched_positions")) == 36
+            )
+        )
+        viewer.until(lambda: len(viewer.array("/ellipses/fill", "batched_colors", "u1")) == 36)
+        colours = viewer.array("/ellipses/fill", "batched_colors", "u1").reshape(-1, 3)
+        assert len(np.unique(colours, axis=0)) == 3
+        viewer.until(lambda: len(viewer.array("/segments", "points")) == 12 * 6)
+
+
+def test_layers_theme_and_selection_reach_the_scene(server: Server, room) -> None:
+    frame = server.play(room, paused=True)
+    with viewing(server) as viewer:
+        viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
+        assert not viewer.nodes["/selection"]["visible"]
+        server.change("PUT", "/selection", {"corner": frame["corners"][0]["id"]})
+        viewer.until(lambda: viewer.nodes["/selection"]["visible"])
+        ring = viewer.array("/selection", "points").reshape(-1, 3)[:, :2].mean(axis=0)
+        corner = frame["corners"][0]["by_method"]["ml"]
+        np.testing.assert_allclose(ring, [corner["x"], corner["y"]], atol=0.01)
+        server.change(
+            "PATCH", "/settings", {"view": {"layers": {"points": False, "grid": False}, "theme": "light"}}
+        )
+        viewer.until(lambda: not (viewer.nodes["/points"]["visible"] or viewer.nodes["/grid"]["visible"]))
+        assert "ThemeConfigurationMessage" in viewer.types
+
+
+def test_a_click_selects_the_nearest_corner(server: Server, room) -> None:
+    frame = server.play(room, paused=True)
+    with server.stream() as stream, viewing(server) as viewer:
+        viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
+        look_from_above(viewer)
+        for corner in frame["corners"]:
+            x, y = (corner["by_method"]["ml"][axis] for axis in "xy")
+            click(viewer, (x + 0.1, y - 0.1, 50.0), (0.0, 0.0, -1.0))
+            stream.state(lambda s, wanted=corner["id"]: s["selection"]["corner"] == wanted)
+        for direction in ((0.0, 0.0, 0.0), (0.0, 0.0, float("nan")), (1.0, 0.0, 0.0)):
+            click(viewer, (0.0, 0.0, 50.0), direction)
+        click(viewer, (float("inf"), 0.0, 50.0), (0.0, 0.0, -1.0))
+        click(viewer, (3.5, 2.2, 50.0), (0.0, 0.0, -1.0))  # once this one has arrived, the others have
+        nearest = min(
+            frame["corners"],
+            key=lambda c: abs(c["by_method"]["ml"]["x"] - 3.5) + abs(c["by_method"]["ml"]["y"] - 2.2),
+        )
+        stream.state(lambda s: s["selection"]["corner"] == nearest["id"])
+
+
+def look_from_above(viewer: Viewer) -> None:
+    """The first camera message makes viser count the client as connected."""
+    viewer.send(
+        type="ViewerCameraMessage", wxyz=(0.0, 1.0, 0.0, 0.0), position=(0.0, 0.0, 50.0), fov=0.1, near=1.0, far=100.0,
+        image_height=600, image_width=800, look_at=(0.0, 0.0, 0.0), up_direction=(0.0, 1.0, 0.0),
+    )  # fmt: skip
+
+
+def click(viewer: Viewer, origin: tuple, direction: tuple) -> None:
+    viewer.send(
+        type="SceneNodeClickMessage", name="/corners", instance_index=0, ray_origin=origin, ray_direction=direction,
+        screen_pos=(0.5, 0.5), modifier=None, owner="",
+    )  # fmt: skip
+
+
+def test_no_message_but_camera_and_click_gets_in(server: Server) -> None:
+    """The share tunnel would call out, uploads would fill the memory, panels are for all: nothing of it happens."""
+    viser_server = server.viser
+    with viewing(server) as viewer:
+        viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
+        look_from_above(viewer)
+        viewer.send(type="ShareUrlRequest")
+        viewer.send(type="GuiUpdateMessage", uuid="x", updates={"value": 1})
+        viewer.send(
+            type="FileTransferStartUpload", source_component_uuid="x", transfer_uuid="y", filename="f",
+            mime_type="m", part_count=10**9, size_bytes=10**12,
+        )  # fmt: skip
+        viewer.websocket.send(b"\x00garbage")
+        viewer.websocket.send("text")
+        viewer.read()
+        assert viser_server._share_tunnel is None
+        assert not viser_server.gui._current_file_upload_states
+
+
+def test_a_broken_message_ends_only_the_client_that_sent_it(server: Server) -> None:
+    with viewing(server) as good, viewing(server) as bad:
+        bad.send(type="SceneNodeClickMessage", nonsense=True)
+        with pytest.raises(ConnectionClosed):
+            bad.until(lambda: False)
+        good.until(lambda: "ReplayDoneMessage" in good.types)
+        assert good.read()
+
+
+@pytest.mark.parametrize("protocols", [["viser-v0.0.1"], None])
+def test_a_client_of_another_version_is_told_so(server: Server, protocols: list | None) -> None:
+    with connect(f"ws://127.0.0.1:{server.port}/viser", subprotocols=protocols) as websocket:
+        with pytest.raises(ConnectionClosed) as closed:
+            websocket.recv(timeout=10)
+        assert closed.value.rcvd.code == 1002
+
+
+def test_viser_opens_no_port(server: Server) -> None:
+    server.next_frame()
+    listening = {
+        c.laddr.port for c in psutil.Process().net_connections("inet") if c.status == psutil.CONN_LISTEN
+    }
+    assert listening == {server.port}
+
+
+def test_the_client_page_is_ours_first_and_calls_nobody(server: Server) -> None:
+    page = httpx.get(f"{server.url}/viser/")
+    html = page.text
+    assert html.index("viser_bridge.js") < html.index("<script", html.index("viser_bridge.js") + 1)
+    assert "unsafe-eval'" not in page.headers["content-security-policy"].replace("wasm-unsafe-eval'", "")
+    assert not re.findall(r"<(?:script|link)[^>]+(?:src|href)=\"?https?:", html)
+    assert httpx.get(f"{server.url}/static/viser_bridge.js").status_code == 200
+    assert httpx.get(f"{server.url}/viser").status_code == 307
+    assert len(html) > 500_000
+
+
+def test_viewers_come_and_go_without_a_trace(server: Server) -> None:
+    states = server.viser._websock_server._client_state_from_id
+    for _ in range(10):
+        with viewing(server) as viewer:
+            viewer.read()
+        with viewing(server) as viewer:
+            viewer.read()
+            viewer.websocket.socket.close()
+    with server.stream() as stream:
+        stream.frame(lambda _: not states)
