@@ -1,11 +1,28 @@
-"""The real recordings, which lie beside the checkout: their licences do not allow shipping most of them."""
+"""For all tests: compiled kernels, the same examples on every run, and the real recordings.
+
+The recordings lie beside the checkout: their licences do not allow shipping most of them.
+"""
 
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
 
+from lidarcore import warm_up
+
 DATA = Path(__file__).parents[2] / "shared" / "data"
+
+
+# The same examples on every run, so that a failure is a change of the code and not of the dice.
+hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=100)
+hypothesis.settings.load_profile("repeatable")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _compiled() -> None:
+    """Compile once, before anything is timed or waited for."""
+    warm_up()
 
 
 @pytest.fixture(scope="session")

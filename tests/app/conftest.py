@@ -9,15 +9,6 @@ import pytest
 from serving import Server, write_room
 
 from app.serve import listen
-from lidarcore import warm_up
-from lidarcore.simulation import demo_scans
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _compiled() -> None:
-    """Compile once, before anything is waited for."""
-    warm_up()
-    next(demo_scans())
 
 
 @pytest.fixture

@@ -81,9 +81,9 @@ def test_every_parameter_has_its_unit_and_goes_back_to_its_default(visitor: Visi
     numbers = [name for name, value in defaults.items() if isinstance(value, int | float)]
     for name in numbers:
         control = page.locator(f"#setting-extraction-{name}")
-        control.fill(f"{1.5 * float(control.input_value()):g}")
+        control.fill(f"{2 * float(control.input_value()):g}")
         page.keyboard.press("Enter")
-    changed = {name: pytest.approx(1.5 * defaults[name], rel=0.01) for name in numbers}
+    changed = {name: pytest.approx(2 * defaults[name], rel=0.01) for name in numbers}
     wait_until(lambda: server.get("settings")["extraction"] == defaults | changed, "all are changed")
     page.get_by_role("button", name="Reset to defaults").click()
     wait_until(lambda: server.get("settings")["extraction"] == defaults, "all are back")
