@@ -182,7 +182,9 @@ class Runtime:
 def _extract_each(taken: Taken, settings: Settings) -> tuple[dict[str, Features], dict[str, float]]:
     """The features by every method and the time each took, us. The segmentation is the same for all."""
     features, times = {}, {}
-    extract(taken.scan, settings.extraction)  # the first call after a pause pays for cold caches, whatever the method
+    extract(
+        taken.scan, settings.extraction
+    )  # the first call after a pause pays for cold caches, whatever the method
     for name in settings.methods:
         begin = time.perf_counter()
         features[name] = extract(taken.scan, replace(settings.extraction, fitter=name))
