@@ -57,6 +57,8 @@ def serve(
     from app.serve import listen, secured
     from app.serve import serve as run
 
+    if recordings.exists() and not recordings.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, "is no folder, give one for --recordings", str(recordings))
     with listen(host, port) as listening:
         from app.server import ServerOptions
 
@@ -161,7 +163,7 @@ def _settings(file: Path | None, assignments: list[str] | None) -> "Settings":
 
     settings = Settings()
     if file is not None:
-        settings = settings.patched(json.loads(file.read_text("utf-8")))
+        settings = settings.patched(_read_settings(file))
     for assignment in assignments or []:
         settings = settings.patched(_patch(assignment))
     return settings
@@ -172,6 +174,18 @@ def _plain(token: str | None) -> str | None:
     if token and not re.fullmatch(r"[A-Za-z0-9._~-]+", token):
         raise typer.BadParameter("a token has letters, digits and - . _ ~ only.")
     return token or None
+
+
+def _read_settings(file: Path) -> dict[str, Any]:
+    from lidarcore import LidarError
+
+    try:
+        settings = json.loads(file.read_text("utf-8"))
+    except ValueError as error:  # not text, or not JSON
+        raise LidarError(f"{file} is no JSON file: {error}.") from error
+    if not isinstance(settings, dict):
+        raise LidarError(f"{file} should hold an object, as GET /api/v1/settings gives it.")
+    return settings
 
 
 def _patch(assignment: str) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Corners: where two neighbouring walls meet (MATH 4, [CWLF 36-48], [WCTLS 24-25])."""
+"""Corners: where two neighbouring walls meet ([CWLF 36-48], [WCTLS 24-25])."""
 
 import numpy as np
 

@@ -28,8 +28,13 @@ def extract(scan: Scan, settings: ExtractionSettings | None = None) -> Features:
 def compare(
     scan: Scan, settings: ExtractionSettings | None = None, fitters: Iterable[str] = tuple(FITTERS)
 ) -> dict[str, Features]:
-    """The same scan by several fitters: segmented once, fitted by each; keyed by the fitter's name."""
+    """The same scan by several fitters: segmented once, fitted by each; keyed by the fitter's name.
+
+    Raises ValueError for a name that is not in FITTERS.
+    """
     settings, names = settings or ExtractionSettings(), tuple(fitters)
+    if unknown := [name for name in names if name not in FITTER_IDS]:
+        raise ValueError(f"unknown fitters {unknown}: choose from {', '.join(FITTERS)}")
     buffers = _buffers.of(len(scan))
     ids = np.array([FITTER_IDS[name] for name in names])
     tables, counts, seen = _extract(scan.ranges, scan.bearings, ids, _parameters(settings), *buffers)

@@ -214,6 +214,12 @@ class Features:
         self.rejections = Rejections(table[::-1][:m], settings.covariance)
         self.noise_seen = noise_seen
 
+    def __repr__(self) -> str:
+        found = (
+            f"{len(self.segments)} segments, {len(self.corners)} corners, {len(self.rejections)} rejections"
+        )
+        return f"Features({self.fitter}: {found})"
+
     @property
     def lines(self) -> Lines:
         """The lines of the segments."""

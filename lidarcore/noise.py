@@ -1,17 +1,17 @@
-"""The sensor's noise: independent Gaussian errors of range and bearing (MATH: [CWLF 10])."""
+"""The sensor's noise: independent Gaussian errors of range and bearing [CWLF 10]."""
 
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 Metres = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False, json_schema_extra={"unit": "m"})]
-Radians = Annotated[float, Field(gt=0, le=0.2, allow_inf_nan=False, json_schema_extra={"unit": "rad"})]
+Radians = Annotated[float, Field(gt=0, le=0.05, allow_inf_nan=False, json_schema_extra={"unit": "rad"})]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True)
 class SensorNoise:
     """Standard deviations of one beam. Both must be positive: no sensor is exact, and weights divide by them."""
 

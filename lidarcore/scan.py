@@ -11,7 +11,7 @@ from lidarcore.errors import ScanError
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-MAX_BEARING = 100.0  # rad; beyond a few turns they are surely in another unit
+MAX_BEARING = 8 * np.pi  # rad; beyond a few turns they are surely in another unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,21 +39,21 @@ class Scan:
     odometry: Array | None = None
 
     def __post_init__(self) -> None:
-        bearings = _row(self.bearings, "bearings")
-        ranges = _row(self.ranges, "ranges")
+        bearings = as_row(self.bearings, "bearings")
+        ranges = as_row(self.ranges, "ranges")
         if not len(ranges):
             raise ScanError("The scan is empty: give at least one beam.")
         if not np.isfinite(bearings).all():
             raise ScanError("A bearing is not a finite number: give every beam its angle in radians.")
         if np.abs(bearings).max() > MAX_BEARING:
             raise ScanError(f"Bearings reach {np.abs(bearings).max():g} rad: give radians, not degrees.")
-        if not np.isfinite(self.stamp):
+        if not (isinstance(self.stamp, int | float) and np.isfinite(self.stamp)):
             raise ScanError(f"The stamp is {self.stamp}: give seconds, or 0 if unknown.")
         with np.errstate(invalid="ignore"):
             ranges = np.where((ranges > 0) & (ranges < np.inf), ranges, np.nan)
         columns = {"ranges": ranges, "bearings": bearings}
         columns |= {
-            name: _row(value, name)
+            name: as_row(value, name)
             for name in ("quality", "beam_times")
             if (value := getattr(self, name)) is not None
         }
@@ -66,7 +66,7 @@ class Scan:
             order = np.argsort(bearings % (2 * np.pi), kind="stable")
             columns = {name: column[order] for name, column in columns.items()}
         if self.odometry is not None:
-            pose = _row(self.odometry, "odometry")
+            pose = as_row(self.odometry, "odometry")
             if pose.shape != (3,) or not np.isfinite(pose).all():
                 raise ScanError(
                     f"odometry is {self.odometry}: give x (m), y (m) and heading (rad), all finite."
@@ -78,6 +78,9 @@ class Scan:
 
     def __len__(self) -> int:
         return len(self.ranges)
+
+    def __repr__(self) -> str:
+        return f"Scan({len(self)} beams, {int(self.valid.sum())} returns, stamp={self.stamp:g} s)"
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:
@@ -91,9 +94,12 @@ class Scan:
         return xy
 
 
-def _row(values: ArrayLike, name: str) -> Array:
+def as_row(values: ArrayLike, name: str) -> Array:
     """A private one-dimensional float copy of the values."""
-    row = np.array(values, np.float64)
+    try:
+        row = np.array(values, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ScanError(f"{name} are not numbers: {error}.") from error
     if row.ndim != 1:
         raise ScanError(f"{name} has shape {row.shape}: give one value for each beam, shape (N,).")
     return row

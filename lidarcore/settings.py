@@ -6,7 +6,7 @@ Command line, REST, page and documentation derive from these declarations.
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator
+from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass
 
 from lidarcore.lines import FITTERS
@@ -19,7 +19,7 @@ def _metres(low: float, high: float, text: str) -> object:
     return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": "m"})
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
 class ExtractionSettings:
     """How a scan becomes segments and corners. Metres and radians; immutable, so a scan never sees a half change.
 
@@ -32,10 +32,20 @@ class ExtractionSettings:
     covariance: Annotated[Covariance, Field(description="which covariance `covariance` means")] = "consistent"
     noise: SensorNoise = field(default_factory=SensorNoise)
     split_threshold: Annotated[
-        float, _metres(0.005, 1.0, "a piece is split where a point is farther than this from its chord")
+        float,
+        _metres(
+            0.005,
+            1.0,
+            "a piece is split where a point is farther from its chord than this and than noise explains",
+        ),
     ] = 0.05
     gap: Annotated[
-        float, _metres(0.02, 5.0, "neighbouring points farther apart than this are not connected")
+        float,
+        _metres(
+            0.02,
+            5.0,
+            "neighbouring points farther apart are not connected, unless as on a wall seen at a grazing angle",
+        ),
     ] = 0.3
     min_points: Annotated[
         int, Field(ge=2, le=1000, description="a segment needs at least this many points")
@@ -52,7 +62,12 @@ class ExtractionSettings:
         ),
     ] = 0.35
     corner_gap: Annotated[
-        float, _metres(0.01, 2.0, "facing ends must be this close to each other and to the intersection")
+        float,
+        _metres(
+            0.01,
+            2.0,
+            "both facing ends must be this close to the intersection, beyond point spacing and noise",
+        ),
     ] = 0.2
 
     @field_validator("fitter")

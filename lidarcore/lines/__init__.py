@@ -22,6 +22,7 @@ from lidarcore.lines.regression import (
 )
 from lidarcore.noise import SensorNoise
 from lidarcore.polar import unit_vectors
+from lidarcore.scan import MAX_BEARING, as_row
 
 __all__ = ["FITTERS", "FITTER_IDS", "LINE_FIELDS", "STATUS_MESSAGES", "Fitter", "Line", "Lines", "fit_piece"]
 
@@ -29,7 +30,7 @@ LINE_FIELDS = 11  # unit normal (2), r, published (4), consistent (4)
 
 STATUS_MESSAGES = {
     NO_DIRECTION: "the points coincide or have no direction",
-    THROUGH_SENSOR: "the line passes through the sensor, which this fitter cannot express",
+    THROUGH_SENSOR: "the line passes through the sensor, or the points are too close together for this fitter",
     NOT_FINITE: "no finite line with positive covariance came out",
 }
 
@@ -49,8 +50,10 @@ def fit_piece(
         status, normal, published = tls.fit_wtls(rho, c, s, v_rho, v_theta, w)
     elif fitter == 4:
         status, normal, published = tls.fit_wctls(rho, c, s, v_rho, v_theta, w)
-    else:
+    elif fitter == 5:
         status, normal, published = ml.fit(rho, c, s, v_rho, v_theta, w)
+    else:
+        return NOT_FINITE
     if status != OK:
         return status
     return store(out, normal, published, consistent_covariance(w, rho, c, s, v_rho, v_theta, normal))
@@ -72,8 +75,8 @@ class Fitter:
         Raises ScanError if they differ in shape, or a value is not finite, or a range is not positive;
         DegenerateLineError if the points do not determine a line this fitter can express.
         """
-        rho, theta = np.array(ranges, np.float64), np.array(bearings, np.float64)
-        if rho.shape != theta.shape or rho.ndim != 1:
+        rho, theta = as_row(ranges, "ranges"), as_row(bearings, "bearings")
+        if rho.shape != theta.shape:
             raise ScanError(f"ranges {rho.shape} and bearings {theta.shape} must both have shape (N,).")
         if len(rho) < 2:
             raise DegenerateLineError(f"{len(rho)} point(s) do not determine a line: give at least 2.")
@@ -82,7 +85,9 @@ class Fitter:
             FITTER_IDS[self.name], rho, theta, noise.sigma_range**2, noise.sigma_bearing**2, out
         )
         if status == _BAD_BEAM:
-            raise ScanError("Ranges must be positive and finite, bearings finite: leave missing returns out.")
+            raise ScanError(
+                "Ranges must be positive and finite, bearings finite and in radians: leave missing returns out."
+            )
         if status != OK:
             raise DegenerateLineError(f"{self.name}: {STATUS_MESSAGES[status]}.")
         alpha = float(normal_angle(out[0], out[1]))
@@ -96,7 +101,7 @@ _BAD_BEAM = 100
 def fit_beams(fitter: int, rho: Array, theta: Array, v_rho: float, v_theta: float, out: Array) -> int:
     """Check the beams and fit them: the compiled call behind `Fitter.fit`."""
     for i in range(len(rho)):
-        if not (rho[i] > 0 and rho[i] < np.inf and np.abs(theta[i]) < 1e5):
+        if not (rho[i] > 0 and rho[i] < np.inf and np.abs(theta[i]) <= MAX_BEARING):
             return _BAD_BEAM
     work = np.empty((3, len(rho)))
     unit_vectors(theta, work[0], work[1])

@@ -1,4 +1,4 @@
-"""A line in Hesse normal form, x cos(alpha) + y sin(alpha) = r, whichever fitter made it (MATH 2)."""
+"""A line in Hesse normal form, x cos(alpha) + y sin(alpha) = r, whichever fitter made it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Line:
     alpha                  rad, direction of the normal, in (-pi, pi]
     r                      m, distance from the sensor, >= 0
     covariance_published   (2, 2) of (alpha, r) in rad and m, by the formula of the fitter's paper
-    covariance_consistent  (2, 2), exact to first order under the noise model (MATH 3)
+    covariance_consistent  (2, 2), exact to first order under the noise model
     """
 
     alpha: float

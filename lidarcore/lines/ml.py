@@ -1,4 +1,4 @@
-"""Maximum likelihood on the ranges: the fitter the papers do not have (MATH 2.5).
+"""Maximum likelihood on the ranges: the fitter the papers do not have.
 
 A wall with normal n at distance r gives rho(theta) = 1 / (q . u(theta)), q = n / r, u = (cos theta, sin theta):
 the regressors u carry no range noise, which is what biases regressions on (x, y).

@@ -70,7 +70,7 @@ def total_least_squares(m: Moments) -> tuple[int, float, float, float]:
 def consistent_covariance(
     w: Array, rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: Normal
 ) -> Sym2:
-    """Sandwich covariance of (alpha, r) for a regression with weights w (MATH 3).
+    """Sandwich covariance of (alpha, r) for a regression with weights w.
 
     To first order every fitter here minimises sum w (e + dalpha t - dr)², e the distance of a point from the line
     and t its coordinate along it; they differ by w only. With A the normal matrix and B the same sum

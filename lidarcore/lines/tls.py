@@ -124,7 +124,7 @@ def _propagate(
 def _conformal(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: Normal) -> Sym2:
     """C_Q = (sum p p^T / (|Q|² vc))^-1 through the Jacobian [23]; vc the conditional variance 1 / (n^T C^-1 n).
 
-    Reconstructed: the paper takes C_Q from an earlier one and does not print it (MATH 2.4). Written in the frame
+    Reconstructed: the paper takes C_Q from an earlier one and does not print it. Written in the frame
     of the line, where Q lies on the normal: dalpha = dQ_t / |Q|, dr = -dQ_n / |Q|², up to the common sign.
     """
     nx, ny, r = normal

@@ -86,7 +86,10 @@ class Recording(ABC):
         if topic is None and len(self.topics) <= 1:
             self.topic = next(iter(self.topics), None)
         elif topic is None:
-            raise TopicError(f"{self.path.name} holds several lidars: choose {listed}.", self.topics)
+            raise TopicError(
+                f"{self.path.name} holds several lidars: choose {listed} (--topic, or topic= in Python).",
+                self.topics,
+            )
         elif topic in self.topics:
             self.topic = topic
         else:

@@ -1,4 +1,4 @@
-"""From a ring of beams to pieces, one for each wall: iterative end point fit, merged back and tidied (MATH 5).
+"""From a ring of beams to pieces, one for each wall: iterative end point fit, merged back and tidied.
 
 Points are packed (missing returns left out) and the ring is unrolled from a break, so that every piece is a slice.
 Pieces are inclusive ranges [first, last] of points.

@@ -1,4 +1,4 @@
-"""Neighbouring pieces: merged where one line explains both, else their common end put where it belongs (MATH 5)."""
+"""Neighbouring pieces: merged where one line explains both, else their common end put where it belongs."""
 
 import numpy as np
 

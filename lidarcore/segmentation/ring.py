@@ -1,4 +1,4 @@
-"""The ring of points: beams that returned, where they are connected, and how noisy they are (MATH 5)."""
+"""The ring of points: beams that returned, where they are connected, and how noisy they are."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Iterative end point fit: split a run of points until each piece is straight (MATH 5)."""
+"""Iterative end point fit: split a run of points until each piece is straight."""
 
 import numpy as np
 

@@ -60,7 +60,7 @@ def line_of(m: Array) -> tuple[float, float, float, float]:
 
 @inlined
 def residuals(m: Array, v_rho: float, v_theta: float) -> tuple[float, float]:
-    """Sum of squared distances of a piece's points from its best line, and their mean effective variance (MATH 1).
+    """Sum of squared distances of a piece's points from its best line, and their mean effective variance.
 
     A short piece close by scatters more along the beams than it is wide, and its best line follows the beams:
     the small variance of that direction makes such a line expensive.

@@ -180,7 +180,7 @@ def room_corner(noise, rng, name):
     ],
 )
 def test_ellipses_hold_the_true_corner_as_often_as_they_say(name, kind, least, most):
-    """Coverage of 95 % ellipses in the papers' small room with the noise of an RPLIDAR S1 (MATH 3)."""
+    """Coverage of 95 % ellipses in the papers' small room with the noise of an RPLIDAR S1."""
     noise, rng, trials = SensorNoise(0.05, np.radians(0.2)), np.random.default_rng(9), 1500
     held = 0
     for _ in range(trials):

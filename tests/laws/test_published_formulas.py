@@ -21,7 +21,7 @@ def measure(wall, noise):
 
 
 def maximum_likelihood(ranges, bearings, noise, start):
-    """Root of the likelihood equations of MATH 2.5 by scipy, in (alpha, r): variances at the fit.
+    """Root of the likelihood equations by scipy, in (alpha, r): variances at the fit.
 
     The covariance is the inverse information, from derivatives of r / cos(bearing - alpha).
     """
