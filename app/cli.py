@@ -1,5 +1,6 @@
 """The command `lidarcore`. Heavy imports happen inside the commands, so that help is instant."""
 
+import errno
 import json
 import re
 import sys

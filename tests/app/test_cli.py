@@ -260,3 +260,16 @@ def test_a_token_of_ones_own_is_demanded_anywhere(serving: Callable[..., Serving
     result = run("serve", "--token", "no spaces")
     assert result.returncode == 2
     assert "Traceback" not in result.stderr
+
+
+def test_a_recording_is_not_overwritten_with_its_own_result(tmp_path: Path) -> None:
+    room = write_room(tmp_path / "room.npz").rename(tmp_path / "room.csv")
+    before = room.read_bytes()
+    assert_refused(run("process", room, "-o", room), "is the recording itself")
+    assert room.read_bytes() == before
+
+
+def test_a_missing_folder_is_named(tmp_path: Path) -> None:
+    room = write_room(tmp_path / "room.npz")
+    assert_refused(run("process", room, "-o", tmp_path / "none" / "room.csv"), "no folder", "none")
+    assert_refused(run("serve", "--port", "0", "--recordings", room), "is no folder")

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lidarcore import Scan, ScanError, extract
+from lidarcore import FITTERS, ExtractionSettings, Scan, ScanError, SensorNoise, compare, extract
 
 angles = st.lists(st.integers(-3141, 3141).map(lambda k: k / 1000), min_size=1, max_size=50, unique=True)
 
@@ -115,3 +115,20 @@ def test_bearings_many_turns_away_are_right_or_refused(turns):
     assert len(features.segments) == 1
     assert features.segments.lines.alpha[0] == pytest.approx(0, abs=1e-9 + 1e-14 * abs(turns))
     assert features.segments.lines.r[0] == pytest.approx(2, abs=1e-9 + 1e-14 * abs(turns))
+
+
+@pytest.mark.parametrize(
+    "degrees", [np.arange(-45.0, 46.0), np.arange(0.0, 360.0)], ids=["90 degrees", "a turn"]
+)
+def test_degrees_are_not_taken_for_radians(degrees):
+    with pytest.raises(ScanError, match="not degrees"):
+        Scan(np.full(len(degrees), 2.0), degrees)
+    with pytest.raises(ScanError, match="radians"):
+        FITTERS["ml"].fit(np.full(len(degrees), 2.0), degrees, SensorNoise())
+
+
+def test_a_misspelt_or_unknown_name_is_refused():
+    with pytest.raises(ValueError, match="min_pionts"):
+        ExtractionSettings(min_pionts=3)
+    with pytest.raises(ValueError, match="unknown fitters"):
+        compare(Scan([1.0, 1.0], [0.0, 0.1]), fitters=["zz"])
