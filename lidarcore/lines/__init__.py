@@ -145,7 +145,7 @@ FITTERS: dict[str, Fitter] = {
             "ml",
             "Maximum likelihood",
             "this project",
-            "Gauss-Newton on the ranges under the sensor's noise model; reaches the Cramér-Rao bound.",
+            "Gauss-Newton on the ranges under the sensor's noise model; near the Cramér-Rao bound at low noise.",
         ),
     )
 }

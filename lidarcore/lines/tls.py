@@ -25,22 +25,25 @@ from lidarcore.lines.regression import (
 def fit_utls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
     """Unweighted [WCTLS 1-7]."""
     w[:] = 1.0
-    m = moments(w, rho, c, s)
-    status, abc, normal = _implicit(m)
-    if status != OK:
-        return status, NO_LINE, NO_LINE
-    return OK, normal, _propagate(w, rho, c, s, v_rho, v_theta, m, abc, False)
+    return _least_squares(rho, c, s, v_rho, v_theta, w, False)
 
 
 @inlined
 def fit_wtls(rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array) -> Fit:
     """Weighted [WCTLS 8-15]."""
     weights_determinant(w, rho)
+    return _least_squares(rho, c, s, v_rho, v_theta, w, True)
+
+
+@inlined
+def _least_squares(
+    rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, w: Array, weighted: bool
+) -> Fit:
     m = moments(w, rho, c, s)
     status, abc, normal = _implicit(m)
     if status != OK:
         return status, NO_LINE, NO_LINE
-    return OK, normal, _propagate(w, rho, c, s, v_rho, v_theta, m, abc, True)
+    return OK, normal, _propagate(w, rho, c, s, v_rho, v_theta, m, abc, weighted)
 
 
 @inlined
