@@ -3,7 +3,14 @@
 Metres, radians, seconds; x forward, y left, angles counter-clockwise (REP-103).
 """
 
-from lidarcore.errors import DegenerateLineError, LidarError, RecordingError, ScanError, TopicError
+from lidarcore.errors import (
+    DegenerateLineError,
+    DeviceError,
+    LidarError,
+    RecordingError,
+    ScanError,
+    TopicError,
+)
 from lidarcore.extraction import compare, extract, warm_up
 from lidarcore.features import Corners, Features, Rejection, Segments
 from lidarcore.lines import FITTERS, Line, Lines
@@ -16,6 +23,7 @@ __all__ = [
     "FITTERS",
     "Corners",
     "DegenerateLineError",
+    "DeviceError",
     "ExtractionSettings",
     "Features",
     "LidarError",

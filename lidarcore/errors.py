@@ -23,3 +23,31 @@ class TopicError(RecordingError):
     def __init__(self, message: str, topics: tuple[str, ...]) -> None:
         super().__init__(message)
         self.topics = topics
+
+
+class DeviceError(LidarError):
+    """The sensor cannot be used; the message names the cause and the cure."""
+
+
+class NoDeviceError(DeviceError):
+    """No sensor was found, or the port named does not exist."""
+
+
+class PortPermissionError(DeviceError):
+    """The user may not open the port."""
+
+
+class PortBusyError(DeviceError):
+    """Another program holds the port."""
+
+
+class NoAnswerError(DeviceError):
+    """Nothing, or nothing that makes sense, came back in time: power, cable, baud rate or another device."""
+
+
+class ProtectionStopError(DeviceError):
+    """The sensor stopped itself for protection, and a reset did not help."""
+
+
+class UnpluggedError(DeviceError):
+    """The port went away while it was in use."""

@@ -1,6 +1,6 @@
 """One revolution of the sensor."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -27,6 +27,7 @@ class Scan:
     quality     (N,) as the sensor reports it, or None
     beam_times  (N,) s after `stamp`, or None
     odometry    (3,) x m, y m, heading rad: T_odom_sensor at `stamp`, or None
+    gaps        (G, 2) rad, from and to, counter-clockwise: sectors whose data were lost on the way from the sensor
 
     Raises ScanError if the arrays are empty, not of one length, or a bearing is not finite or not in radians.
     """
@@ -37,6 +38,7 @@ class Scan:
     quality: Array | None = None
     beam_times: Array | None = None
     odometry: Array | None = None
+    gaps: Array = field(default_factory=lambda: np.empty((0, 2)))
 
     def __post_init__(self) -> None:
         bearings = as_row(self.bearings, "bearings")
@@ -72,6 +74,7 @@ class Scan:
                     f"odometry is {self.odometry}: give x (m), y (m) and heading (rad), all finite."
                 )
             columns["odometry"] = pose
+        columns["gaps"] = _as_sectors(self.gaps)
         for name, column in columns.items():
             column.flags.writeable = False
             object.__setattr__(self, name, column)
@@ -86,6 +89,11 @@ class Scan:
     def valid(self) -> NDArray[np.bool_]:
         """(N,) true where the beam returned."""
         return ~np.isnan(self.ranges)
+
+    @cached_property
+    def completeness(self) -> float:
+        """Share of the revolution that arrived, 0 to 1."""
+        return float(1 - ((self.gaps[:, 1] - self.gaps[:, 0]) % (2 * np.pi)).sum() / (2 * np.pi))
 
     @cached_property
     def xy(self) -> Array:
@@ -103,6 +111,15 @@ def as_row(values: ArrayLike, name: str) -> Array:
     if row.ndim != 1:
         raise ScanError(f"{name} has shape {row.shape}: give one value for each beam, shape (N,).")
     return row
+
+
+def _as_sectors(gaps: ArrayLike) -> Array:
+    sectors = np.array(gaps, np.float64)
+    if sectors.ndim != 2 or sectors.shape[1] != 2 or not np.isfinite(sectors).all():
+        raise ScanError(
+            f"gaps has shape {sectors.shape}: give from and to of each sector in rad, shape (G, 2)."
+        )
+    return sectors
 
 
 def _follows_the_ring(bearings: Array) -> bool:
