@@ -1,7 +1,7 @@
-"""Simulated worlds and sensors: known truth for tests, benchmarks and the demo."""
+"""Simulated worlds and sensors: known truth for tests and benchmarks, and the room of the emulated sensor."""
 
 from lidarcore.simulation.rooms import furnished_room, random_pose
-from lidarcore.simulation.sensor import SimulatedSensor, demo_scans
+from lidarcore.simulation.sensor import SimulatedSensor
 from lidarcore.simulation.world import World
 
-__all__ = ["SimulatedSensor", "World", "demo_scans", "furnished_room", "random_pose"]
+__all__ = ["SimulatedSensor", "World", "furnished_room", "random_pose"]

@@ -1,13 +1,11 @@
 """A simulated sensor: true ranges with the noise of the model, at bearings that change from scan to scan."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Ints, Scan
-from lidarcore.simulation.rooms import furnished_room
 from lidarcore.simulation.world import World
 
 RATE = 10.0  # revolutions per second, as an RPLIDAR S1 turns
@@ -38,21 +36,3 @@ class SimulatedSensor:
         times = np.arange(self.beams) / (RATE * self.beams)
         order = np.argsort(bearings)  # noise may swap neighbours; a real sensor's angles grow
         return Scan(ranges[order], bearings[order], stamp, quality[order], times), hit[order]
-
-
-def demo_scans(seed: int = 0) -> Iterator[Scan]:
-    """Endless scans of the furnished room, 10 a second, from a sensor that wanders along a closed curve."""
-    rng = np.random.default_rng(seed)
-    sensor = SimulatedSensor(furnished_room())
-    k = 0
-    while True:
-        stamp = k / RATE
-        yield sensor.scan(_wander(stamp), rng, stamp)[0]
-        k += 1
-
-
-def _wander(t: float) -> Array:
-    """A slow figure of eight in the middle of the room, clear of the furniture; one round takes two minutes."""
-    phase = 2 * np.pi * t / 120
-    x, y = 4.5 + 1.0 * np.sin(phase), 4.0 + 0.6 * np.sin(2 * phase)
-    return np.array([x, y, 0.6 * np.sin(phase / 2)])

@@ -17,10 +17,12 @@ class World:
     def cast(self, pose: Array, bearings: Array) -> tuple[Array, Ints]:
         """True ranges (N,) m, NaN where no wall is met, and the wall each beam meets (N,), -1 for none.
 
-        pose (3,): T_world_sensor as x m, y m, heading rad; bearings (N,) rad in the sensor frame.
+        pose (3,), or (N, 3) if the sensor moves from beam to beam: T_world_sensor as x m, y m, heading rad;
+        bearings (N,) rad in the sensor frame.
         """
         ranges, hit = np.empty(len(bearings)), np.empty(len(bearings), np.int64)
-        _cast(self.walls, pose[0], pose[1], bearings + pose[2], ranges, hit)
+        x, y, heading = np.broadcast_to(pose, (len(bearings), 3)).T.copy()
+        _cast(self.walls, x, y, bearings + heading, ranges, hit)
         return ranges, hit
 
     def clearance(self, x: float, y: float) -> float:
@@ -32,12 +34,12 @@ class World:
 
 
 @kernel
-def _cast(walls: Array, x: float, y: float, directions: Array, ranges: Array, hit: Ints) -> None:
+def _cast(walls: Array, x: Array, y: Array, directions: Array, ranges: Array, hit: Ints) -> None:
     for i in range(len(directions)):
         ux, uy = np.cos(directions[i]), np.sin(directions[i])
         nearest, wall = np.inf, -1
         for k in range(len(walls)):
-            ax, ay = walls[k, 0, 0] - x, walls[k, 0, 1] - y
+            ax, ay = walls[k, 0, 0] - x[i], walls[k, 0, 1] - y[i]
             dx, dy = walls[k, 1, 0] - walls[k, 0, 0], walls[k, 1, 1] - walls[k, 0, 1]
             det = dx * uy - dy * ux
             if det == 0:

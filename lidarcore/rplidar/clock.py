@@ -1,0 +1,41 @@
+"""When samples were measured, from when their bytes arrived."""
+
+import numpy as np
+
+from lidarcore.scan import Array, Ints
+
+LEAK = 0.01
+"""How much slower the sensor's clock may run than it says: 9,200 samples/s are told, 9,259 follow from 108 us."""
+
+_CALM = float("inf")
+
+
+class SampleClock:
+    """Samples are measured evenly; their bytes arrive with delays that vary, but are never early.
+
+    So the lower envelope of arrival minus sample count is the clock, free of the jitter of USB and scheduler. The rest
+    is a constant, as in Slamtec's SDK: 1.5 sample periods for measuring, and the time of a packet on the line.
+    """
+
+    def __init__(self, period: float, packet_time: float) -> None:
+        self._period = period
+        self._delay = 1.5 * period + packet_time
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew: samples are not known to be evenly spaced with those before."""
+        self._zero, self._latest = _CALM, 0.0
+
+    def arrived(self, count: int, arrival: float) -> None:
+        """Tell that the first `count` samples had arrived at this time (s)."""
+        slack = LEAK * max(arrival - self._latest, 0.0)
+        self._zero, self._latest = min(arrival - count * self._period, self._zero + slack), arrival
+
+    def late(self, count: int, arrival: float) -> float:
+        """How much later (s) than expected the first `count` samples have arrived."""
+        return arrival - count * self._period - self._zero
+
+    def times(self, indices: Ints) -> Array:
+        """When (s) the samples of these indices, counted from 0, were measured."""
+        times: Array = self._zero - self._delay + self._period * (indices + 1).astype(np.float64)
+        return times

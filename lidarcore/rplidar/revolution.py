@@ -1,0 +1,64 @@
+"""One turn of the sensor, as it was measured."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarcore.scan import Array, Ints, Scan
+
+TURN = 360 << 16  # 1/65536 degree
+RADIAN = 2 * np.pi / TURN  # of 1/65536 degree
+
+
+@dataclass(frozen=True, eq=False)
+class Revolution:
+    """Samples of one turn, in the order they were measured.
+
+    angles     (N,) 1/65536 degree, clockwise from the front, within the turn
+    distances  (N,) 1/4 mm; 0: no return
+    times      (N,) s, when measured, on the clock of `arrival`
+    quality    (N,) as transmitted; None for dense, express and ultra capsules, which carry none
+    gaps       (G, 2) 1/65536 degree, from and to, clockwise: sectors that were lost on the way
+    arrival    s, when the bytes that completed it arrived
+    """
+
+    angles: Ints
+    distances: Ints
+    times: Array
+    quality: NDArray[np.uint8] | None
+    gaps: Ints
+    arrival: float
+
+    def __len__(self) -> int:
+        return len(self.angles)
+
+    @property
+    def complete(self) -> bool:
+        """Nothing of the turn was lost."""
+        return not len(self.gaps)
+
+    @property
+    def z_q14(self) -> Ints:
+        """(N,) the angles as Slamtec's SDK gives them: 1/16384 of a right angle."""
+        z: Ints = ((self.angles >> 10) << 8) // 90
+        return z
+
+    def scan(self, stamp_offset: float = 0.0) -> Scan:
+        """The same as a Scan: metres, radians counter-clockwise, its stamp that of the sample measured first.
+
+        stamp_offset  s, added to the stamp: from the clock of `arrival` to Unix time
+        """
+        return Scan(
+            self.distances[::-1] / 4000,
+            _wrapped(-RADIAN * self.angles[::-1]),
+            stamp=float(self.times[0] + stamp_offset),
+            quality=None if self.quality is None else self.quality[::-1],
+            beam_times=self.times[::-1] - self.times[0],
+            gaps=_wrapped(-RADIAN * self.gaps[:, ::-1]),
+        )
+
+
+def _wrapped(angles: Array) -> Array:
+    """Angles from -2 pi to 0 rad, turned to within -pi to pi."""
+    return np.where(angles <= -np.pi, angles + 2 * np.pi, angles)

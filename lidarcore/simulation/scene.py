@@ -1,0 +1,78 @@
+"""A room that lives: people walk, the sensor moves, and every beam has a time of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lidarcore.noise import SensorNoise
+from lidarcore.scan import Array
+from lidarcore.simulation.paths import Path
+from lidarcore.simulation.people import Person, distances_to_legs
+from lidarcore.simulation.world import World
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Walls, who walks between them, and where the sensor is."""
+
+    world: World
+    path: Path
+    people: Sequence[Person] = ()
+
+    def cast(self, times: Array, bearings: Array) -> tuple[Array, Array]:
+        """True ranges (N,) m, NaN for none, of beams at growing times (N,) s and bearings (N,) rad, sensor frame.
+
+        Beside them the sine (N,) of the angle at which each beam meets its wall; 1 for a leg.
+        """
+        poses = self.path(times)
+        ranges, hit = self.world.cast(poses, bearings)
+        directions = np.exp(1j * (bearings + poses[:, 2])).view(float).reshape(-1, 2)
+        sines = _sines(self.world.walls[hit], directions)
+        if self.people:
+            legs = np.concatenate([person.legs(times) for person in self.people])
+            distances = distances_to_legs(legs, poses[:, :2], directions)
+            nearer = distances < np.where(np.isnan(ranges), np.inf, ranges)
+            ranges, sines = np.where(nearer, distances, ranges), np.where(nearer, 1.0, sines)
+        return ranges, sines
+
+
+@dataclass(frozen=True, slots=True)
+class Optics:
+    """What a sensor makes of true ranges.
+
+    mixed      share of the beams at a step in range that meet both sides: they report something in between
+    dropouts   share of all beams that are lost for no reason in particular
+    grazing    sine of the angle to the wall below which nothing comes back
+    limits     m, nearest and farthest range that is reported
+    """
+
+    noise: SensorNoise
+    mixed: float = 0.5
+    dropouts: float = 0.003
+    grazing: float = 0.03
+    limits: tuple[float, float] = (0.1, 40.0)
+    step: float = 0.15  # m between neighbours from which on a beam can be mixed
+
+    def observe(self, ranges: Array, sines: Array, rng: np.random.Generator) -> tuple[Array, Array]:
+        """Reported ranges (N,) m, NaN for no return, and quality (N,), 0 to 63, of neighbouring beams."""
+        seen = self._mix(ranges, rng) + rng.normal(0, self.noise.sigma_range, len(ranges))
+        low, high = self.limits
+        lost = (rng.random(len(ranges)) < self.dropouts) | (sines < self.grazing)
+        seen = np.where(lost | ~((seen >= low) & (seen <= high)), np.nan, seen)
+        quality = np.clip(np.rint((60 - 1.5 * seen) * np.sqrt(sines)), 5, 63)
+        return seen, np.where(np.isnan(seen), 0.0, quality)
+
+    def _mix(self, ranges: Array, rng: np.random.Generator) -> Array:
+        """Where range jumps from one beam to the next, some lie anywhere between both sides."""
+        step = np.diff(ranges, append=ranges[-1:])
+        mixed = (np.abs(step) > self.step) & (rng.random(len(ranges)) < self.mixed)
+        return ranges + np.where(mixed, step * rng.random(len(ranges)), 0.0)
+
+
+def _sines(walls: Array, directions: Array) -> Array:
+    """Sine (N,) of the angle between each wall (N, 2, 2) and unit vector (N, 2)."""
+    along = walls[:, 1] - walls[:, 0]
+    across = along[:, 0] * directions[:, 1] - along[:, 1] * directions[:, 0]
+    sines: Array = np.abs(across) / np.hypot(along[:, 0], along[:, 1])
+    return sines

@@ -1,0 +1,215 @@
+"""Pacing, and every fault the emulator can be told to have, seen from the other end of the line."""
+
+import os
+import time
+
+import numpy as np
+import psutil
+import pytest
+import serial
+from emulated_line import ASK_HEALTH, ASK_INFO, LEGACY, SCAN, capsules, line_to, nodes, steps
+
+from lidarcore import DeviceError
+from lidarcore.rplidar.emulator_process import EmulatorProcess
+from lidarcore.rplidar.faults import Faults
+
+CAPSULE = 40 * 108e-6  # s
+STEP = 15.552  # degrees at 10 Hz
+
+
+@pytest.fixture(scope="module")
+def emulator():
+    with EmulatorProcess(spin_up=0.05) as emulator:
+        yield emulator
+
+
+@pytest.fixture
+def line(emulator):
+    for command in ("replug", "flip 0", "lose 0", "lose-bytes 0", "stall 0"):
+        emulator.command(command)
+    with line_to(emulator) as line:
+        yield line
+
+
+def test_capsules_come_at_the_pace_of_an_s1_and_cost_little(emulator, line):
+    line.scan()
+    line.capsules(20)
+    process = psutil.Process(emulator.pid)
+    used, at = process.cpu_times(), []
+    for _ in range(450):
+        line.capsules(1)
+        at.append(time.monotonic())
+    now = process.cpu_times()
+    late = at - np.arange(450) * CAPSULE  # of each, but for a constant
+    assert at[-1] - at[0] == pytest.approx(449 * CAPSULE, rel=0.01)
+    assert np.median(late) - late.min() < 0.002  # most are where they belong, to half a capsule
+    assert now.user + now.system - used.user - used.system < 0.05 * (at[-1] - at[0])
+
+
+def test_legacy_nodes_come_at_the_pace_of_an_s1(line):
+    line.scan(SCAN, LEGACY)
+    line.read(5 * 160)
+    begin = time.monotonic()
+    line.read(5 * 4000)
+    assert time.monotonic() - begin == pytest.approx(4000 * 244e-6, rel=0.03)
+
+
+def test_flipped_bits_break_that_share_of_the_capsules(emulator, line):
+    emulator.command("flip 0.3")
+    line.scan()
+    whole = line.capsules(300)[0]
+    assert 0.2 < 1 - whole.mean() < 0.4  # six standard deviations of 300 draws are 0.16
+    emulator.command("flip 0")
+    line.capsules(60)
+    assert line.capsules(60)[0].all()
+
+
+def test_lost_capsules_leave_twice_the_angle(emulator, line):
+    emulator.command("lose 0.2")
+    line.scan()
+    whole, _, starts, _ = line.capsules(300)
+    assert whole.all()
+    lost = np.rint(steps(starts)[30:] / STEP) - 1
+    assert 0.1 < lost.sum() / (lost + 1).sum() < 0.3
+
+
+def test_after_a_lost_byte_nothing_is_where_it_was(emulator, line):
+    emulator.command("lose-bytes 0.01")
+    line.scan()
+    data = line.read(84 * 200)
+    whole = [capsules(data[at : at + 84])[0][0] for at in range(len(data) - 84)]
+    assert not any(whole[::84][20:])
+    assert 0.25 < sum(whole) / 200 < 0.6  # 0.99 to the power of 84 is 0.43
+
+
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 1.0])
+def test_shares_are_shares(share):
+    packets, rng = np.arange(84 * 20000).astype(np.uint8), np.random.default_rng(1)
+    tolerance = 5 * np.sqrt(share * (1 - share) / 20000)
+    damaged = np.frombuffer(Faults(flip=share, rng=rng).damage(packets.tobytes(), 84), np.uint8)
+    bits = np.unpackbits((damaged ^ packets).reshape(-1, 84), axis=1).sum(axis=1)
+    assert set(bits) <= {0, 1}
+    assert bits.mean() == pytest.approx(share, abs=tolerance)
+    kept = len(Faults(lose=share, rng=rng).damage(packets.tobytes(), 84))
+    assert kept % 84 == 0
+    assert kept / len(packets) == pytest.approx(1 - share, abs=tolerance)
+    kept = len(Faults(lose_bytes=share, rng=rng).damage(packets.tobytes(), 0))
+    assert kept / len(packets) == pytest.approx(1 - share, abs=tolerance)
+
+
+def test_faults_of_legacy_nodes_are_those_of_single_nodes(emulator, line):
+    emulator.command("lose 0.5")
+    line.scan(SCAN, LEGACY)
+    start, not_start, _, check, angle, _ = nodes(line.read(5 * 800))
+    assert ((start ^ not_start) & check).all()
+    lost = np.rint(steps(angle)[400:] / (360 * 10 * 244e-6)) - 1
+    assert 0.4 < lost.sum() / (lost + 1).sum() < 0.6
+
+
+def test_garbage_comes_between_whole_capsules(emulator, line):
+    line.scan()
+    line.capsules(10)
+    emulator.command("garbage 1000")
+    assert not all(line.capsules(1)[0][0] for _ in range(300))
+    line.read(1000 - 84)
+    assert line.capsules(60)[0].all()
+
+
+def test_a_stall_is_a_silence_in_which_the_head_turns_on(emulator, line):
+    line.scan()
+    line.capsules(50)
+    emulator.command("stall 0.6")
+    begin = time.monotonic()
+    line.serial.timeout = 0.2
+    before = line.serial.read(84 * 100)
+    assert len(before) < 84 * 50
+    assert line.is_silent(0.2)
+    line.serial.timeout = 5
+    whole, flags, _, _ = line.capsules(20)
+    assert whole.all()
+    assert not flags.any()  # the scan goes on, it does not begin again
+    assert time.monotonic() - begin >= 0.6
+
+
+def test_a_client_that_does_not_read_stops_nothing(emulator, line):
+    line.scan()
+    line.capsules(10)
+    begin = time.monotonic()
+    while time.monotonic() - begin < 1.5:  # more than the line holds
+        emulator.command("stall 0")
+    backlog = 0
+    line.serial.timeout = 0
+    while data := line.serial.read(1 << 16):
+        backlog += len(data)
+    assert 84 * 100 < backlog < 84 * 300  # 347 capsules in 1.5 s
+    line.serial.timeout = 5
+    line.drain()
+    assert line.ask(ASK_HEALTH, 10) == "a55a0300000006" "000000"  # fmt: skip
+
+
+def test_unplugged_the_port_is_gone_and_who_had_it_open_gets_errors(emulator, line):
+    line.scan()
+    emulator.command("unplug")
+    assert not os.path.lexists(emulator.port)
+    with pytest.raises(serial.SerialException):
+        line.serial.read(1 << 20)
+    with pytest.raises(serial.SerialException):
+        serial.Serial(emulator.port)
+    emulator.command("unplug")  # again does nothing
+    emulator.command("garbage 100")
+    emulator.command("health 2")
+
+
+def test_replugged_it_answers_at_the_same_path_as_just_switched_on(emulator, line):
+    line.scan()
+    for _ in range(3):
+        emulator.command("unplug")
+        emulator.command("replug")
+        with line_to(emulator) as again:
+            assert again.is_silent(0.05)
+            assert again.ask(ASK_INFO, 27).startswith("a55a1400000004")
+            again.scan()
+            assert again.capsules(3)[1].tolist() == [True, False, False]
+
+
+def test_plugged_in_again_it_may_have_to_boot():
+    with EmulatorProcess(boot=0.5) as emulator:
+        emulator.command("replug")
+        begin = time.monotonic()
+        with line_to(emulator) as line:
+            line.ask_until_answered(ASK_INFO, 27)
+        assert time.monotonic() - begin > 0.4
+
+
+def test_faults_combine(emulator, line):
+    for command in ("lose 0.1", "flip 0.1", "lose-bytes 0.002", "stall 0.2"):
+        emulator.command(command)
+    line.scan()
+    emulator.command("garbage 5000")
+    data = line.read(84 * 200)
+    whole = [capsules(data[at : at + 84])[0][0] for at in range(len(data) - 84)]
+    assert 60 < sum(whole) < 140  # of 140 that are no garbage, 0.9 * 0.998 to the power of 84 = 0.76
+    emulator.command("health 2 3")
+    line.drain()
+    assert line.ask(ASK_HEALTH, 10) == "a55a0300000006" "020300"  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("command", "complaint"),
+    [
+        ("explode", "no command 'explode'; there are unplug"),
+        ("flip 1.5", "a share is from 0 to 1"),
+        ("lose -0.1", "a share is from 0 to 1"),
+        ("lose-bytes nan", "a share is from 0 to 1"),
+        ("garbage -1", "give 0 to 65536 bytes"),
+        ("stall", "usage: stall"),
+        ("stall soon", "usage: stall"),
+        ("unplug 3", "usage: unplug"),
+        ("health 3", "the status is 0, 1 or 2"),
+        ("", "no command ''"),
+    ],
+)
+def test_a_wrong_command_is_answered_and_changes_nothing(emulator, line, command, complaint):
+    with pytest.raises(DeviceError, match=complaint):
+        emulator.command(command)
+    assert line.ask(ASK_HEALTH, 10) == "a55a0300000006" "000000"  # fmt: skip
