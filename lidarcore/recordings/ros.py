@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lidarcore.recordings.base import Recording
+from lidarcore.recordings.beams import BEAMS, fits
 from lidarcore.recordings.poses import PoseTrack, compose
 from lidarcore.recordings.ros_frames import FrameTree, planar, rotation
 from lidarcore.recordings.ros_messages import LASER, ODOMETRY, Message, decode, frame, scan_of, seconds
@@ -32,7 +33,7 @@ class RosRecording(Recording):
         frames, laser_frames = FrameTree(), dict[str, str]()
         tracks: defaultdict[str, list[tuple[str, Array]]] = defaultdict(list)
         for message in self._messages(connections):
-            if message.topic in laser_frames:
+            if message.topic in laser_frames or message.type == BEAMS:
                 continue
             if (content := decode(message)) is None:
                 self._remark("Damaged messages are left out.")
@@ -82,16 +83,21 @@ class RosRecording(Recording):
             self._remark(f"The sensor is tilted by {tilt:.0f} degrees: taken as level.")
 
     def _scans(self) -> Iterator[Callable[[], Scan]]:
+        beams, has_beams = None, False
         for message in self._messages({}):
-            if message.topic != self.topic or message.type != LASER:
-                continue
-            laser = decode(message)
-            if laser is None:
-                self._count("damaged scans left out", 1)
-            else:
-                yield partial(self._scan, laser, message)
+            if message.type == BEAMS and message.topic == f"{self.topic}/beams":
+                beams, has_beams = decode(message), True
+            elif message.type == LASER and message.topic == self.topic:
+                if (laser := decode(message)) is None:
+                    self._count("damaged scans left out", 1)
+                    continue
+                exact = beams if beams is not None and fits(beams, laser) else None
+                self._count(
+                    "scans whose exact bearings are lost: even steps taken", int(has_beams and not exact)
+                )
+                yield partial(self._scan, laser, exact, message)
 
-    def _scan(self, laser: Any, message: Message) -> Scan:
+    def _scan(self, laser: Any, beams: Any | None, message: Message) -> Scan:
         stamp = _stamp(laser, message)
         self._count("scans without a stamp: the time of recording is taken", int(not seconds(laser.header)))
         T_odom_sensor = self._odometry.at(stamp)
@@ -99,7 +105,9 @@ class RosRecording(Recording):
             self._count("scans outside the time of the odometry", int(len(self._odometry) > 0))
         elif self.T_base_sensor is not None:
             T_odom_sensor = compose(T_odom_sensor, self.T_base_sensor)
-        return scan_of(laser, stamp, mirrored=self._mirrored, odometry=T_odom_sensor, count=self._count)
+        return scan_of(
+            laser, beams, stamp, mirrored=self._mirrored, odometry=T_odom_sensor, count=self._count
+        )
 
 
 def _stamp(content: Any, message: Message) -> float:

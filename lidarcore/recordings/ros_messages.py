@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lidarcore.errors import ScanError
+from lidarcore.recordings.beams import BEAMS, BEAMS_DEFINITION
 from lidarcore.scan import Array, Scan
 
 LASER = "sensor_msgs/LaserScan"
 ODOMETRY = "nav_msgs/Odometry"
 TRANSFORMS = "tf2_msgs/TFMessage"
-WANTED = (LASER, ODOMETRY, TRANSFORMS)
+WANTED = (LASER, BEAMS, ODOMETRY, TRANSFORMS)
 
 _ONE_TURN = 2 * np.pi + 1e-3  # angle_increment is a float32
 
@@ -34,31 +35,30 @@ def plain_type(name: str) -> str:
 
 
 @cache
-def _decoder(encoding: str) -> Callable[[bytes, str], Any]:
+def typestore(encoding: str) -> Any:
+    """Types of ROS 1 ("ros1") or ROS 2 ("cdr") as rosbags knows them, with those it lacks."""
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if encoding == "ros1" else Stores.ROS2_HUMBLE)
-    name = TRANSFORMS.replace("/", "/msg/")
-    store.register(
-        get_types_from_msg("geometry_msgs/TransformStamped[] transforms", name)
-    )  # not in ROS1_NOETIC
-    decode: Callable[[bytes, str], Any] = (
-        store.deserialize_ros1 if encoding == "ros1" else store.deserialize_cdr
-    )
-    return decode
+    definitions = {TRANSFORMS: "geometry_msgs/TransformStamped[] transforms", BEAMS: BEAMS_DEFINITION}
+    for name, definition in definitions.items():
+        store.register(get_types_from_msg(definition, name.replace("/", "/msg/")))
+    return store
 
 
 def decode(message: Message) -> Any | None:
     """Decode a message; None if it is damaged."""
+    store = typestore(message.encoding)
+    deserialize = store.deserialize_ros1 if message.encoding == "ros1" else store.deserialize_cdr
     try:
-        return _decoder(message.encoding)(message.data, message.type.replace("/", "/msg/"))
+        return deserialize(message.data, message.type.replace("/", "/msg/"))
     except Exception:  # the generated decoders raise whatever the bytes lead them to
         return None
 
 
 def seconds(header: Any) -> float:
     """Stamp of a message's header in s; 0 if it was not set."""
-    return float(header.stamp.sec + header.stamp.nanosec * 1e-9)
+    return float(header.stamp.sec + header.stamp.nanosec / 1e9)
 
 
 def frame(name: str) -> str:
@@ -68,44 +68,57 @@ def frame(name: str) -> str:
 
 def scan_of(
     laser: Any,
+    beams: Any | None,
     stamp: float,
     *,
     mirrored: bool,
     odometry: Array | None,
     count: Callable[[str, int], None],
 ) -> Scan:
-    """Turn a LaserScan (REP-117: outside [range_min, range_max) is no return) into a Scan.
+    """Turn a LaserScan, with the Beams message of our own recordings if there is one, into a Scan.
 
     mirrored: the sensor hangs upside down, so that its counter-clockwise is seen as clockwise from above.
     What is left out or turned goes to `count`. Raises ScanError if the angles make no sense.
     """
-    with np.errstate(invalid="ignore"):  # of signalling NaN in damaged files
-        ranges = np.asarray(laser.ranges, np.float64)
-    increment = float(laser.angle_increment)
-    bearings = laser.angle_min + increment * np.arange(len(ranges))
+    ranges = _within_limits(laser, count)
+    increment = -laser.angle_increment if mirrored else laser.angle_increment
     if not 0 < abs(increment) * max(len(ranges) - 1, 1) <= _ONE_TURN:
         raise ScanError(f"{len(ranges)} beams {increment:.6g} rad apart: expected radians, at most one turn")
-    lower, upper = float(laser.range_min), float(laser.range_max)
-    if 0 <= lower < upper:
-        beyond, below = np.isfinite(ranges) & (ranges >= upper), (ranges > 0) & (ranges < lower)
-        count(f"ranges at or beyond range_max ({upper:g} m) taken as missing", int(beyond.sum()))
-        count(f"ranges below range_min ({lower:g} m) taken as missing", int(below.sum()))
-        ranges[beyond | below] = np.nan
+    if beams is None:
+        count("scans that ran clockwise, turned", int(increment < 0))
+        bearings = laser.angle_min + laser.angle_increment * np.arange(len(ranges))
+        times = laser.time_increment * np.arange(len(ranges)) if 0 < laser.time_increment < np.inf else None
+        gaps, kept = np.empty((0, 2)), np.arange(len(ranges))
     else:
-        count(
-            f"scans with senseless limits (range_min {lower:g}, range_max {upper:g} m), which are ignored", 1
-        )
-    beam_times = laser.time_increment * np.arange(len(ranges)) if 0 < laser.time_increment < np.inf else None
-    quality = np.asarray(laser.intensities, np.float64) if len(laser.intensities) == len(ranges) else None
+        bearings, gaps = beams.bearings, beams.gaps.reshape(-1, 2)
+        times, kept = beams.times if len(beams.times) else None, np.flatnonzero(np.isfinite(bearings))
     if mirrored:
-        bearings, increment = -bearings, -increment
-    order = slice(None, None, -1 if increment < 0 else 1)
-    count("scans that ran clockwise, turned", int(increment < 0))
+        bearings, gaps = -bearings, -gaps[:, ::-1]
+    quality = laser.intensities if len(laser.intensities) == len(ranges) else None
+    order = kept[::-1] if increment < 0 else kept
     return Scan(
         ranges[order],
         bearings[order],
         stamp,
         quality if quality is None else quality[order],
-        beam_times if beam_times is None else beam_times[order],
+        times if times is None else times[order],
         odometry,
+        gaps,
     )
+
+
+def _within_limits(laser: Any, count: Callable[[str, int], None]) -> Array:
+    """Ranges (N,) of a LaserScan; outside [range_min, range_max) is no return (REP-117)."""
+    with np.errstate(invalid="ignore"):  # of signalling NaN in damaged files
+        ranges = np.asarray(laser.ranges, np.float64)
+    lower, upper = float(laser.range_min), float(laser.range_max)
+    if not 0 <= lower < upper:
+        count(
+            f"scans with senseless limits (range_min {lower:g}, range_max {upper:g} m), which are ignored", 1
+        )
+        return ranges
+    beyond, below = np.isfinite(ranges) & (ranges >= upper), (ranges > 0) & (ranges < lower)
+    count(f"ranges at or beyond range_max ({upper:g} m) taken as missing", int(beyond.sum()))
+    count(f"ranges below range_min ({lower:g} m) taken as missing", int(below.sum()))
+    ranges[beyond | below] = np.nan
+    return ranges

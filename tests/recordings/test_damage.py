@@ -9,18 +9,22 @@ from backports import zstd
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType
+from recorded_scans import demo, dense_stream
 from ros_writers import drive, write_bag1, write_mcap
 from scipy.io import savemat
 
+from lidarcore import extract
 from lidarcore.errors import RecordingError
 from lidarcore.recordings import open_recording
+from lidarcore.recordings.writer import RecordingWriter
+from lidarcore.rplidar.capture import CaptureWriter, Stream
 
 SWEEP = {"deadline": None, "suppress_health_check": [HealthCheck.function_scoped_fixture], "database": None}
 
 SAMPLES = (
     "real.bag", "bz2.bag", "lz4.bag", "real.db3", "plain.mcap", "zstd.mcap", "carmen.log", "carmen.log.gz",
     "carmen.log.zstd", "table.csv", "rooms.csv", "dump.txt", "plain.mat", "packed.mat", "plain.npz", "packed.npz",
-    "points.json",
+    "points.json", "own.mcap", "own.rplidar", "hex.txt",
 )  # fmt: skip
 IN_ONE_PIECE = (".mat", ".npz", ".json")  # of which a part cannot be read
 
@@ -56,6 +60,15 @@ def samples(data, tmp_path_factory):
     savemat(folder / "packed.mat", arrays, do_compression=True)
     np.savez(folder / "plain.npz", **arrays)
     np.savez_compressed(folder / "packed.npz", **arrays)
+    with RecordingWriter(folder / "own.mcap") as recording:
+        for scan in demo(60):
+            recording.write(scan, extract(scan))
+    with CaptureWriter(folder / "own.rplidar", Stream(0x85, 108.0)) as capture:
+        for capsule, time in dense_stream(30):
+            capture.write("in", time, capsule)
+    (folder / "hex.txt").write_bytes(
+        (data / "rplidar_raw_serial_hex/sample_data_motorctrl_1st_try.txt").read_bytes()
+    )
     return folder
 
 
