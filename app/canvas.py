@@ -12,7 +12,7 @@ from app.shapes import DISC_FACES, DISC_VERTICES, Array, about_z, lift
 FIELD_OF_VIEW = np.radians(6.0)  # so narrow that the picture is nearly orthographic
 FAR = 2e4  # m
 HEIGHTS = {  # from the floor up
-    "grid": 0, "labels": 0, "fill": 1, "segments": 2, "outline": 3, "points": 4, "rejected": 5, "crosses": 5,
+    "grid": 0, "labels": 0, "gaps": 1, "fill": 1, "segments": 2, "outline": 3, "points": 4, "rejected": 5, "crosses": 5,
     "markers": 6, "sensor": 7, "ring": 8,
 }  # fmt: skip
 
@@ -32,6 +32,7 @@ class Canvas:
                 "/grid", infinite_grid=True, fade_distance=FAR, fade_strength=0, shadow_opacity=0
             ),
             "labels": self._add_strokes("/labels", 1),
+            "gaps": self._add_strokes("/gaps", 1),
             "fill": self._add_discs("/ellipses/fill", 0.3),
             "segments": self._add_strokes("/segments", 4),
             "outline": self._add_strokes("/ellipses/outline", 1.5),

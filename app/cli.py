@@ -5,12 +5,14 @@ import json
 import re
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from app.settings import Settings
+from app.cli_devices import devices
+from app.cli_emulate import PASS_ON, emulate
+from app.cli_options import Set, SettingsFile, settings_from
+from app.cli_record import record
 
 cli = typer.Typer(
     name="lidarcore",
@@ -22,24 +24,33 @@ cli = typer.Typer(
 
 RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
 Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="a setting, e.g. gap=0.2 or noise.sigma_range=0.01"),
-]
-SettingsFile = Annotated[
-    Path | None,
-    typer.Option("--settings", help="a JSON file of settings, as GET /api/v1/settings gives them"),
-]
 
 
 @cli.command()
 def serve(
-    recording: Annotated[Path | None, typer.Argument(help="play this; a simulated room if not given")] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Argument(help="play this; if not given, the sensor connected, else an emulated one"),
+    ] = None,
     topic: Topic = None,
     host: Annotated[
         str, typer.Option(help="address to listen on; a token is needed unless it is local")
     ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=0, max=65535, help="0 takes any free one")] = 8000,
+    http_port: Annotated[
+        int, typer.Option(min=0, max=65535, help="port of the dashboard; 0 takes any free one")
+    ] = 8000,
+    port: Annotated[
+        str | None,
+        typer.Option(
+            help="serial port of the sensor, such as /dev/ttyUSB0; a mere number is taken as --http-port"
+        ),
+    ] = None,
+    baud: Annotated[int | None, typer.Option(min=1200, help="of the sensor; 256000 if not given")] = None,
+    mode: Annotated[str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers")] = None,
+    rpm: Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")] = None,
+    emulator: Annotated[
+        bool, typer.Option("--emulator", help="an emulated sensor, whatever is connected")
+    ] = False,
     recordings: Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")] = Path(
         "recordings"
     ),
@@ -58,16 +69,24 @@ def serve(
     from app.serve import listen, secured
     from app.serve import serve as run
 
+    if port is not None and port.isdecimal():
+        http_port, port = int(port), None
+    if sum(given not in (None, False) for given in (recording, port, emulator)) > 1:
+        raise typer.BadParameter("give one of RECORDING, --port and --emulator.")
+
     if recordings.exists() and not recordings.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, "is no folder, give one for --recordings", str(recordings))
-    with listen(host, port) as listening:
+    with listen(host, http_port) as listening:
+        from app.live import DeviceOptions
         from app.server import ServerOptions
 
         options = ServerOptions(
             recordings=recordings,
             recording=recording,
             topic=topic,
-            settings=_settings(settings, set_),
+            device=DeviceOptions(port, baud, mode, rpm, emulator),
+            say=lambda sentence: print(sentence, flush=True),
+            settings=settings_from(settings, set_),
             max_bytes=max_upload << 20,
             hosts=tuple(allow_host or ()),
             token=_plain(token),
@@ -92,7 +111,7 @@ def process(
     from app.export import process as run
     from lidarcore import open_recording
 
-    chosen = _settings(settings, set_)
+    chosen = settings_from(settings, set_)
     fitters = [chosen.patched({"extraction": {"fitter": name}}).extraction.fitter for name in fitter or []]
     columns = (BarColumn(), TextColumn("{task.completed} scans"), TimeElapsedColumn())
     console = Console(stderr=True)
@@ -121,6 +140,11 @@ def info(recording: RecordingPath, topic: Topic = None) -> None:
 
     for name, value in summarise(open_recording(recording, topic)):
         typer.echo(f"{name:20} {value}")
+
+
+cli.command()(devices)
+cli.command()(record)
+cli.command(add_help_option=False, context_settings=PASS_ON)(emulate)
 
 
 @cli.command()
@@ -158,52 +182,11 @@ def _message(error: Exception) -> str | None:
     return None
 
 
-def _settings(file: Path | None, assignments: list[str] | None) -> "Settings":
-    """The defaults, changed by the file, changed by each NAME=VALUE."""
-    from app.settings import Settings
-
-    settings = Settings()
-    if file is not None:
-        settings = settings.patched(_read_settings(file))
-    for assignment in assignments or []:
-        settings = settings.patched(_patch(assignment))
-    return settings
-
-
 def _plain(token: str | None) -> str | None:
     """The token, if it can stand in an address, a header and a cookie as it is; none if it is empty."""
     if token and not re.fullmatch(r"[A-Za-z0-9._~-]+", token):
         raise typer.BadParameter("a token has letters, digits and - . _ ~ only.")
     return token or None
-
-
-def _read_settings(file: Path) -> dict[str, Any]:
-    from lidarcore import LidarError
-
-    try:
-        settings = json.loads(file.read_text("utf-8"))
-    except ValueError as error:  # not text, or not JSON
-        raise LidarError(f"{file} is no JSON file: {error}.") from error
-    if not isinstance(settings, dict):
-        raise LidarError(f"{file} should hold an object, as GET /api/v1/settings gives it.")
-    return settings
-
-
-def _patch(assignment: str) -> dict[str, Any]:
-    """'gap=0.2' or 'view.theme=light' as a merge patch; names without a section are of the extraction."""
-    name, equals, text = assignment.partition("=")
-    if not equals:
-        raise typer.BadParameter(f"{assignment!r} should be NAME=VALUE, e.g. gap=0.2.")
-    try:
-        patch = json.loads(text)
-    except json.JSONDecodeError:
-        patch = text
-    path = name.split(".")
-    if path[0] not in ("extraction", "view"):
-        path.insert(0, "extraction")
-    for part in reversed(path):
-        patch = {part: patch}
-    return dict(patch)
 
 
 if __name__ == "__main__":

@@ -26,12 +26,12 @@ from lidarcore.scan import Array
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """A scan as the source handed it over, and when (time.perf_counter, s)."""
+    """A scan as the source handed it over, and when its last byte had arrived (time.monotonic, s)."""
 
     scan: Scan
     position: PositionJson
     source: int  # changes with every source opened
-    handed_over: float
+    arrival: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +60,10 @@ class Frame:
         firsts = ((row.id, *next(iter(row.index.items()))) for row in self.corners)
         return [(id_, self.features[name].corners.xy[i]) for id_, name, i in firsts]
 
+    def age(self) -> float:
+        """Seconds since the last byte of the scan arrived."""
+        return time.monotonic() - self.taken.arrival
+
     def drawn(self, microseconds: float) -> "Frame":
         """This frame with the time that drawing it took."""
         return replace(self, draw_us=microseconds)
@@ -84,6 +88,8 @@ class Frame:
             "source": self.taken.position,
             "n_beams": len(scan),
             "n_valid": int(scan.valid.sum()),
+            "completeness": scan.completeness,
+            "gaps": scan.gaps.tolist(),
             "noise_seen": next(iter(self.features.values())).noise_seen,
             "fitter": self.settings.extraction.fitter,
             "covariance": self.settings.extraction.covariance,
@@ -92,7 +98,7 @@ class Frame:
                 "extract_us": self.extract_us,
                 "per_method": dict(self.method_us),
                 "draw_us": self.draw_us,
-                "age_ms": 1e3 * (time.perf_counter() - self.taken.handed_over),
+                "age_ms": 1e3 * self.age(),
             },
             "rate_hz": self.rate_hz,
             "dropped": self.dropped,

@@ -15,6 +15,7 @@ from app.problems import ProblemError
 from app.sources import check_readable
 
 MAX_BYTES = 1 << 30
+BUILTIN = tuple(sorted((Path(__file__).parent / "demo").glob("*.mcap")))
 BAG_FILES = (".db3", ".mcap")  # what makes a folder a ROS 2 bag
 PLAIN_NAME = re.compile(r"(?!\.)[^/\\:*?\"<>|\x00-\x1f\x7f]{1,200}(?<![. ])")  # a file name on every system
 
@@ -23,39 +24,42 @@ class RecordingJson(TypedDict):
     name: str
     size: int
     modified: str
+    builtin: bool
 
 
 @dataclass(frozen=True)
 class Library:
-    """Recordings in one folder, and the one given on the command line, wherever that is."""
+    """Recordings in one folder, the one given on the command line, wherever that is, and those that come along."""
 
     folder: Path
     max_bytes: int = MAX_BYTES
     given: Path | None = None
+    builtin: tuple[Path, ...] = BUILTIN
 
     def list(self) -> list[RecordingJson]:
         """What could be played: files, and folders that are ROS 2 bags."""
         paths = set(self.folder.iterdir()) if self.folder.is_dir() else set()
-        if self.given is not None:
-            paths.add(self.given)
-        return [_entry(path) for path in sorted(paths, key=lambda p: p.name.lower()) if _is_candidate(path)]
+        elsewhere = [path for path in self._elsewhere if not (self.folder / path.name).exists()]
+        candidates = filter(_is_candidate, {*paths, *elsewhere})
+        return [self._entry(path) for path in sorted(candidates, key=lambda p: p.name.lower())]
 
     def path(self, name: str) -> Path:
         """Where the recording is. Raises ProblemError 404 if there is none, 422 if that is no file name."""
         if self.given is not None and self._is_given(name):
             return self.given
         path = self.folder / checked_name(name)
+        if not path.exists():
+            path = next((path for path in self.builtin if path.name == name), path)
         if not _is_candidate(path):
             raise ProblemError(404, f"There is no recording {name!r}.")
         return path
 
     def delete(self, name: str) -> None:
-        """Delete it. Raises ProblemError like `path`, and 409 for the one given on the command line."""
+        """Delete it. Raises ProblemError like `path`, and 409 for one that is not in the folder."""
         path = self.path(name)
         if path.parent != self.folder:
-            raise ProblemError(
-                409, f"{name!r} is not in the recordings folder: it was given on the command line."
-            )
+            whence = "it comes with lidarcore" if path in self.builtin else "it was given on the command line"
+            raise ProblemError(409, f"{name!r} is not in the recordings folder: {whence}.")
         if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
@@ -79,7 +83,33 @@ class Library:
                 partial.replace(path)
         except OSError as error:
             raise ProblemError(507, f"The recording could not be stored: {error.strerror}.") from error
-        return _entry(path)
+        return self._entry(path)
+
+    def new(self, name: str) -> Path:
+        """Where a new recording goes. Raises ProblemError 409 if the name is taken, 422 if it is no file name."""
+        path = self.folder / checked_name(name)
+        self._check_free(path, overwrite=False)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise ProblemError(
+                507, f"There can be no recordings folder {self.folder}: {error.strerror}."
+            ) from error
+        return path
+
+    @property
+    def _elsewhere(self) -> tuple[Path, ...]:
+        return self.builtin if self.given is None else (self.given, *self.builtin)
+
+    def _entry(self, path: Path) -> RecordingJson:
+        status = path.stat()
+        size = sum(file.stat().st_size for file in path.iterdir()) if path.is_dir() else status.st_size
+        return {
+            "name": path.name,
+            "size": size,
+            "modified": datetime.fromtimestamp(status.st_mtime, UTC).isoformat(timespec="seconds"),
+            "builtin": path in self.builtin,
+        }
 
     def _check_free(self, path: Path, overwrite: bool) -> None:
         if path.is_dir() or self._is_given(path.name) or (path.exists() and not overwrite):
@@ -117,13 +147,3 @@ def _is_candidate(path: Path) -> bool:
     if path.name.startswith("."):
         return False
     return path.is_file() or any(file.suffix in BAG_FILES for file in path.glob("*"))
-
-
-def _entry(path: Path) -> RecordingJson:
-    status = path.stat()
-    size = sum(file.stat().st_size for file in path.iterdir()) if path.is_dir() else status.st_size
-    return {
-        "name": path.name,
-        "size": size,
-        "modified": datetime.fromtimestamp(status.st_mtime, UTC).isoformat(timespec="seconds"),
-    }

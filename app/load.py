@@ -14,6 +14,7 @@ import psutil
 from websockets.asyncio.client import connect
 
 SETTLE = 3.0  # s before measuring
+ALL_LAYERS = ("--set", "view.layers.rejected=true")  # the one that is off by default
 
 
 @dataclass(slots=True)
@@ -29,7 +30,7 @@ class Load:
 
 
 def measure_load(clients: int, seconds: float) -> Load:
-    """Serve the simulated room to this many browsers: each a stream of frames and a scene."""
+    """Serve an emulated sensor to this many browsers: each a stream of frames and a scene."""
     with _server() as (process, port):
         return asyncio.run(_measure(process, port, clients, seconds))
 
@@ -38,9 +39,11 @@ def measure_load(clients: int, seconds: float) -> Load:
 def _server() -> Iterator[tuple[psutil.Process, int]]:
     """A server of its own process on a free port."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "app.cli", "serve", "--port", "0", "--recordings", folder]
+        command = [sys.executable, "-m", "app.cli", "serve", "--emulator", "--http-port", "0", *ALL_LAYERS]
+        command += ["--recordings", folder]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
             assert server.stdout is not None
+            server.stdout.readline()  # what plays
             address = server.stdout.readline().split()[-1]
             try:
                 yield psutil.Process(server.pid), int(address.rstrip("/").rsplit(":", 1)[1])

@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 
 from app.frame import Taken
 from app.sources import Source
-from app.wire import PositionJson
+from app.wire import DeviceJson, Kind, PositionJson
 
 State = Literal["loading", "playing", "paused", "ended", "error"]
 LATE = 0.05  # s behind the stamps after which they are not caught up with: no bursts after a stall
@@ -19,7 +19,9 @@ LOOP_PAUSE = 0.5  # s that the last scan stays before a loop begins again
 class SourceJson(TypedDict):
     """What plays, where it is, and how."""
 
-    kind: Literal["simulation", "recording"]
+    kind: Kind
+    live: bool
+    device: DeviceJson | None
     recording: str | None
     topic: str | None
     topics: list[str]
@@ -37,7 +39,7 @@ class SourceJson(TypedDict):
 
 
 class Player:
-    """Plays a source by its stamps: pause, step, seek, speed, loop; from any thread.
+    """Plays a recording by its stamps, a live source as it comes: pause, step, seek, speed, loop; from any thread.
 
     hand_over   takes each scan when it is due
     is_idle     whether the last scan handed over has been dealt with: the pace at speed 0
@@ -74,10 +76,15 @@ class Player:
     def close(self) -> None:
         with self._condition:
             self._closed = True
-            self._source.close()
             self._condition.notify()
+        self._source.close()
         if self._thread.is_alive():
             self._thread.join(timeout=0.5)
+
+    @property
+    def source(self) -> Source:
+        """What plays."""
+        return self._source
 
     def wake(self) -> None:
         """Something that the thread may be waiting for has happened."""
@@ -87,13 +94,13 @@ class Player:
     def open(self, source: Source, index: int = 0, paused: bool = False) -> None:
         """Play another source from the given index."""
         with self._condition:
-            self._source.close()
-            self._source, self._paused = source, paused
+            before, self._source, self._paused = self._source, source, paused
             self._opened += 1
             self._seek(index)
             if self._thread.is_alive():
                 source.start(self.wake, self._on_change)
         self._on_change()
+        before.close()  # takes a while if a motor has to be stopped
 
     def control(
         self,
@@ -125,7 +132,7 @@ class Player:
     def refresh(self) -> None:
         """Hand the current scan over again, unless the next one comes anyway."""
         with self._condition:
-            if self._paused or self._ended:
+            if self._paused or self._ended or self._source.live:
                 self._wanted = True
                 self._condition.notify()
 
@@ -135,6 +142,8 @@ class Player:
             source, index = self._source, self._index
             return {
                 "kind": source.kind,
+                "live": source.live,
+                "device": source.device(),
                 "recording": source.name,
                 "topic": source.topic,
                 "topics": list(source.topics),
@@ -143,7 +152,7 @@ class Player:
                 "state": self._state(),
                 "error": source.error,
                 "index": index,
-                "count": source.count,
+                "count": self._count(),
                 "complete": source.complete,
                 "time": source.time(index) if self._there(index) else 0.0,
                 "duration": source.duration,
@@ -159,7 +168,11 @@ class Player:
         return "paused" if self._paused else "playing"
 
     def _there(self, index: int) -> bool:
-        return self._source.count is None or index < self._source.count
+        return index < self._source.count
+
+    def _count(self) -> int | None:
+        """How many scans there are; None where there is no end."""
+        return None if self._source.live else self._source.count
 
     def _seek(self, index: int) -> None:
         self._index = self._source.nearest(index)
@@ -179,6 +192,9 @@ class Player:
                 return None
         if self._paused or self._ended:
             return None
+        if self._source.live:
+            self._catch_up()
+            return None
         following = self._index + 1
         if not self._there(following):
             if not self._source.complete:
@@ -189,6 +205,13 @@ class Player:
                 return None
             return self._due(0, LOOP_PAUSE)
         return self._due(following, self._source.time(following) - self._source.time(self._index))
+
+    def _catch_up(self) -> None:
+        """Show the newest, unless it is shown already."""
+        newest = self._source.count - 1
+        if newest > self._index:
+            self._index = newest
+            self._show(time.monotonic())
 
     def _due(self, index: int, interval: float) -> float | None:
         """Go to the index once the interval at the present speed is over."""
@@ -211,8 +234,8 @@ class Player:
         position: PositionJson = {
             "kind": self._source.kind,
             "index": self._index,
-            "count": self._source.count,
+            "count": self._count(),
             "time": self._source.time(self._index),
         }
-        self._hand_over(Taken(scan, position, self._opened, time.perf_counter()))
+        self._hand_over(Taken(scan, position, self._opened, self._source.arrival(self._index)))
         return True

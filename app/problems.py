@@ -11,8 +11,26 @@ from pydantic_core import to_json
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
 
+from app.recorder import RecorderBusyError
 from app.runtime import UnknownCornerError
-from lidarcore import LidarError, TopicError
+from lidarcore import DeviceError, LidarError, TopicError
+from lidarcore.errors import (
+    NoAnswerError,
+    NoDeviceError,
+    PortBusyError,
+    PortPermissionError,
+    ProtectionStopError,
+    UnpluggedError,
+)
+
+DEVICE_STATUS = {
+    NoDeviceError: 404,
+    PortPermissionError: 403,
+    PortBusyError: 409,
+    NoAnswerError: 504,
+    ProtectionStopError: 503,
+    UnpluggedError: 503,
+}
 
 
 class ProblemJson(BaseModel):
@@ -85,6 +103,8 @@ def install(app: FastAPI) -> None:
     handle(RequestValidationError, _invalid)
     handle(ValidationError, _invalid)
     handle(TopicError, lambda e: ProblemError(409, str(e), topics=list(e.topics)))
+    handle(DeviceError, lambda e: ProblemError(DEVICE_STATUS.get(type(e), 422), str(e)))
+    handle(RecorderBusyError, lambda e: ProblemError(409, str(e)))
     handle(LidarError, lambda e: ProblemError(422, str(e)))
     handle(UnknownCornerError, lambda e: ProblemError(404, str(e)))
     handle(Exception, lambda e: ProblemError(500, "An error in the server itself; its log says more."))

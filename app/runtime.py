@@ -72,7 +72,7 @@ class Runtime:
         self.change_listeners: list[Callable[[], None]] = []
         self._draw = draw
         self._slot = Slot()
-        self.player = Player(source, self._slot.put, lambda: self._slot.idle, self._changed)
+        self.player = Player(source, self._slot.put, lambda: self._slot.idle, self.announce)
         self._tracker, self._source = Tracker(), 0
         self._times: deque[float] = deque(maxlen=20)
         self._sequence = 0
@@ -112,10 +112,11 @@ class Runtime:
 
     def _refreshed(self) -> Settings:
         self.player.refresh()
-        self._changed()
+        self.announce()
         return self.settings
 
-    def _changed(self) -> None:
+    def announce(self) -> None:
+        """Tell the listeners that something besides the frame has changed."""
         for listener in self.change_listeners:
             listener()
 
@@ -126,7 +127,7 @@ class Runtime:
             logger.exception("the kernels could not be compiled ahead; they will be when they are needed")
         self.ready = True
         self.player.start()
-        self._changed()
+        self.announce()
         while (taken := self._slot.take()) is not None:
             self._attempt(taken)
             self._slot.done()

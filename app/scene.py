@@ -9,7 +9,18 @@ from viser import ViserServer
 from app.canvas import Canvas
 from app.colours import Rgbs, categorical, method_rgb, rgb, turbo
 from app.frame import Frame
-from app.shapes import ARROW, CIRCLE, CROSS, Array, axis_labels, beams_between, ellipses, nice_step, polylines
+from app.shapes import (
+    ARROW,
+    CIRCLE,
+    CROSS,
+    Array,
+    axis_labels,
+    beams_between,
+    ellipses,
+    nice_step,
+    polylines,
+    wedge,
+)
 from lidarcore import Features
 
 INKS = {
@@ -36,7 +47,13 @@ class Scene:
         """Show the frame."""
         with self._server.atomic():
             self._prepare(frame)
-            for draw in (self._draw_scan, self._draw_segments, self._draw_corners, self._draw_rejected):
+            for draw in (
+                self._draw_scan,
+                self._draw_gaps,
+                self._draw_segments,
+                self._draw_corners,
+                self._draw_rejected,
+            ):
                 draw(frame)
         self._server.flush()
         self._frame = frame
@@ -64,6 +81,12 @@ class Scene:
         self._canvas.points("points", layers.points, scan.xy[scan.valid], self._point_colours(frame))
         for name, visible in (("grid", layers.grid), ("labels", layers.grid), ("sensor", layers.sensor)):
             self._canvas.visible(name, visible)
+
+    def _draw_gaps(self, frame: Frame) -> None:
+        """The sectors whose data were lost on the way, as wedges."""
+        outlines = [wedge(start, end) * self._reach for start, end in frame.taken.scan.gaps.tolist()]
+        strokes = polylines(np.array(outlines).reshape(-1, *CIRCLE.shape))
+        self._canvas.strokes("gaps", frame.settings.view.layers.gaps, strokes, self._ink("rejected"))
 
     def _point_colours(self, frame: Frame) -> Rgbs:
         """One colour (3,) for all points, or (N, 3)."""

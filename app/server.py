@@ -1,6 +1,6 @@
 """The app: REST, WebSocket, page and scene on one port."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import resources
@@ -11,15 +11,19 @@ from fastapi.staticfiles import StaticFiles
 from starlette.responses import FileResponse
 
 from app import problems
-from app.api import docs, frame, meta, recordings, selection, settings, source
+from app.api import docs, frame, meta, recorder, recordings, selection, sensor, settings, source
 from app.library import MAX_BYTES, Library
+from app.live import DeviceOptions, Taps, connected_or_emulated
+from app.metrics import Metrics, metrics_router
+from app.recorder import AsyncRecorder
 from app.runtime import Runtime, UnknownCornerError
 from app.scene import Scene
 from app.security import Guard
 from app.settings import Settings
-from app.sources import RecordingSource, SimulationSource
+from app.sources import RecordingSource, Source
 from app.stream import Hub
 from app.viser_mount import ViserMount
+from lidarcore import Scan, extract
 
 API = "/api/v1"
 STATIC = Path(str(resources.files("app"))).parent / "static"
@@ -32,6 +36,8 @@ class ServerOptions:
     recordings: Path = Path("recordings")
     recording: Path | None = None
     topic: str | None = None
+    device: DeviceOptions = field(default_factory=DeviceOptions)
+    say: Callable[[str], None] = lambda sentence: None
     settings: Settings = field(default_factory=Settings)
     max_bytes: int = MAX_BYTES
     hosts: tuple[str, ...] = ()
@@ -39,13 +45,15 @@ class ServerOptions:
 
 
 def create_app(options: ServerOptions) -> FastAPI:
-    """The whole server as an ASGI app. Raises RecordingError or TopicError for a bad recording."""
-    given = options.recording
-    first = SimulationSource() if given is None else RecordingSource(given, options.topic)
+    """The whole server as an ASGI app. Raises RecordingError, TopicError or DeviceError if it has nothing to play."""
+    recording, measured = AsyncRecorder(), Metrics()
+    taps = Taps(scan=lambda scan: _record(recording, runtime, scan), bytes=recording.tap)
+    first = _first_source(options, taps)
     mount = ViserMount()
     scene = Scene(mount.server, lambda corner: _try_to_select(runtime, corner))
     runtime = Runtime(first, options.settings, scene.draw)
-    hub = Hub(runtime)
+    hub = Hub(runtime, recording, measured.sent)
+    measured.watch(runtime, hub, recording)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -54,6 +62,7 @@ def create_app(options: ServerOptions) -> FastAPI:
         yield
         hub.close()
         runtime.close()
+        recording.stop()
         mount.close()
 
     app = FastAPI(
@@ -66,18 +75,36 @@ def create_app(options: ServerOptions) -> FastAPI:
         responses=problems.documented(422),
     )
     app.state.runtime, app.state.hub, app.state.viser = runtime, hub, mount.server
-    app.state.library = Library(options.recordings, options.max_bytes, given)
+    app.state.library = Library(options.recordings, options.max_bytes, options.recording)
+    app.state.recorder, app.state.taps = recording, taps
     problems.install(app)
     problems.document(app)
     api = APIRouter(prefix=API)
-    for module in (frame, settings, recordings, source, selection, meta):
+    for module in (frame, settings, source, sensor, recordings, recorder, selection, meta):
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(docs.router)
+    app.include_router(metrics_router(measured))
     mount.install(app)
     _add_page(app)
     app.add_middleware(Guard, hosts=options.hosts, token=options.token, uploads=f"{API}/recordings/")
     return app
+
+
+def _first_source(options: ServerOptions, taps: Taps) -> Source:
+    """The recording given; else the sensor asked for or connected, else an emulated one, and says which."""
+    if options.recording is not None:
+        return RecordingSource(options.recording, options.topic)
+    source, sentences = connected_or_emulated(options.device, taps)
+    for sentence in sentences:
+        options.say(sentence)
+    return source
+
+
+def _record(recording: AsyncRecorder, runtime: Runtime, scan: Scan) -> None:
+    """Every scan of a live source is recorded, shown or not, with what the main method finds in it."""
+    if recording.running:
+        recording.put(scan, extract(scan, runtime.settings.extraction))
 
 
 def _try_to_select(runtime: Runtime, corner: int) -> None:

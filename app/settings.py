@@ -25,6 +25,7 @@ class Layers(_Frozen):
     rejected: Annotated[bool, Field(description="candidates that were rejected")] = False
     grid: Annotated[bool, Field(description="grid in metres")] = True
     sensor: Annotated[bool, Field(description="the sensor")] = True
+    gaps: Annotated[bool, Field(description="sectors lost on the way from the sensor")] = True
 
 
 class ViewSettings(_Frozen):

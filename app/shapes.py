@@ -43,6 +43,12 @@ def polylines(points: Array) -> Array:
     return np.stack([points[:, :-1], points[:, 1:]], 2).reshape(-1, 2, 2)
 
 
+def wedge(start: float, end: float) -> Array:
+    """Outline of the sector of the unit circle from one bearing counter-clockwise to the other, rad: (33, 2)."""
+    arc = start + np.linspace(0, (end - start) % (2 * np.pi), len(CIRCLE) - 2)
+    return np.vstack([np.zeros(2), np.stack([np.cos(arc), np.sin(arc)], -1), np.zeros(2)])
+
+
 def ellipses(xy: Array, covariance: Array, scale: float) -> tuple[Array, Array, Array]:
     """Half axes (C, 2), angle of the first (C,), outlines (C, 33, 2); covariances (C, 2, 2) at xy (C, 2)."""
     variances, axes = np.linalg.eigh(covariance)

@@ -1,19 +1,17 @@
-"""Where scans come from: the built-in simulated room, or a recording read ahead in the background."""
+"""Where scans come from: what every source offers, and recordings, read ahead in the background."""
 
 import logging
 import threading
 import time
 from abc import abstractmethod
-from collections import deque
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
-from lidarcore import LidarError, Scan, TopicError, open_recording
-from lidarcore.simulation import demo_scans
+from app.wire import DeviceJson, Kind
+from lidarcore import DeviceError, LidarError, Scan, TopicError, open_recording
 
 PERIOD = 0.1  # s between scans whose stamps do not grow
-HISTORY = 200  # simulated scans kept for stepping back
 MEMORY = 1 << 30  # bytes of scans kept of one recording
 BYTES_PER_BEAM = 60  # ranges, bearings, quality, times; xy and validity once they were asked for
 PROGRESS_EVERY = 0.5  # s between reports of how much is loaded
@@ -22,9 +20,10 @@ logger = logging.getLogger(__name__)
 
 
 class Source(Protocol):
-    """Scans by index, from 0. `count` is how many there are so far, None if they never end."""
+    """Scans by index, from 0. A live one shows each as it comes, not by its stamp."""
 
-    kind: Literal["simulation", "recording"]
+    kind: Kind
+    live: bool = False
     name: str | None = None
     topic: str | None = None
     topics: tuple[str, ...] = ()
@@ -37,8 +36,9 @@ class Source(Protocol):
         return ()
 
     @property
-    def count(self) -> int | None:
-        return None
+    @abstractmethod
+    def count(self) -> int:
+        """How many there have been so far."""
 
     @property
     def duration(self) -> float | None:
@@ -56,42 +56,25 @@ class Source(Protocol):
     def time(self, index: int) -> float:
         """Play time of a scan that is there, s since the first one."""
 
+    def arrival(self, index: int) -> float:
+        """When its last byte came, time.monotonic() s; for one that is not live, now."""
+        return time.monotonic()
+
+    def device(self) -> DeviceJson | None:
+        """The sensor, if there is one."""
+        return None
+
+    def set_speed(self, rpm: int) -> None:
+        """Turn the sensor at that speed. Raises DeviceError if there is none, or not at that one."""
+        raise DeviceError("A recording has no motor: play a device or the emulator.")
+
     @abstractmethod
     def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
         """Begin to read ahead; `arrived` is called after every scan, `progress` now and then."""
 
     @abstractmethod
     def close(self) -> None:
-        """Stop reading ahead."""
-
-
-class SimulationSource(Source):
-    """An endless walk through a furnished room; the last HISTORY scans can be stepped back to."""
-
-    kind = "simulation"
-
-    def __init__(self) -> None:
-        self._scans = demo_scans()
-        self._kept: deque[Scan] = deque(maxlen=HISTORY)
-        self._made = 0
-
-    def nearest(self, index: int) -> int:
-        return max(self._made - len(self._kept), min(index, self._made + HISTORY), 0)
-
-    def scan(self, index: int) -> Scan:
-        while self._made <= index:
-            self._kept.append(next(self._scans))
-            self._made += 1
-        return self._kept[index - self._made]
-
-    def time(self, index: int) -> float:
-        return index * PERIOD
-
-    def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
-        """Scans are made when they are asked for."""
-
-    def close(self) -> None:
-        """There is nothing to stop."""
+        """Stop reading."""
 
 
 class RecordingSource(Source):
@@ -100,7 +83,7 @@ class RecordingSource(Source):
     Raises RecordingError or TopicError if it cannot be played.
     """
 
-    kind = "recording"
+    kind: Kind = "recording"
 
     def __init__(self, path: Path, topic: str | None = None) -> None:
         self._recording = open_recording(path, topic)

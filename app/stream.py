@@ -7,7 +7,10 @@ from pydantic_core import to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.frame import Frame
+from app.recorder import AsyncRecorder
 from app.runtime import Runtime
+
+TICK = 0.5  # s
 
 
 class Mailbox:
@@ -27,8 +30,8 @@ class Mailbox:
         self._frame = frame
         self._news.set()
 
-    async def take(self, state: Callable[[], str]) -> list[str]:
-        """Wait for news; the messages to send now, made at this moment."""
+    async def take(self, state: Callable[[], str]) -> tuple[list[str], Frame | None]:
+        """Wait for news; the messages to send now, made at this moment, and the frame among them."""
         await self._news.wait()
         self._news.clear()
         changed, self._state_changed = self._state_changed, False
@@ -36,14 +39,15 @@ class Mailbox:
         messages = [state()] if changed else []
         if frame is not None:
             messages.append(_message("frame", frame.text_with_points if self._points else frame.text))
-        return messages
+        return messages, frame
 
 
 class Hub:
     """Hands what the runtime's threads produce to the clients on the event loop."""
 
-    def __init__(self, runtime: Runtime) -> None:
-        self._runtime = runtime
+    def __init__(self, runtime: Runtime, recorder: AsyncRecorder, sent: Callable[[Frame], None]) -> None:
+        """`sent` is told of every frame that was handed to a browser's socket."""
+        self._runtime, self._recorder, self._sent = runtime, recorder, sent
         self._mailboxes: set[Mailbox] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         runtime.frame_listeners.append(lambda frame: self._post(Mailbox.put_frame, frame))
@@ -56,8 +60,10 @@ class Hub:
     def open(self) -> None:
         """Deliver from now on, on the running event loop."""
         self._loop = asyncio.get_running_loop()
+        self._ticking = self._loop.create_task(self._tick())
 
     def close(self) -> None:
+        self._ticking.cancel()
         self._loop = None
 
     def state(self) -> str:
@@ -67,6 +73,7 @@ class Hub:
             "settings": runtime.settings.model_dump(),
             "source": runtime.player.describe(),
             "selection": {"corner": runtime.selected},
+            "recorder": self._recorder.status,
             "ready": runtime.ready,
         }
         return _message("state", to_json(state).decode())
@@ -90,8 +97,18 @@ class Hub:
 
     async def _send(self, websocket: WebSocket, mailbox: Mailbox) -> None:
         while True:
-            for message in await mailbox.take(self.state):
+            messages, frame = await mailbox.take(self.state)
+            for message in messages:
                 await websocket.send_text(message)
+            if frame is not None:
+                self._sent(frame)
+
+    async def _tick(self) -> None:
+        """The counters of a live source, and the size of a recording, change all the time."""
+        while True:
+            await asyncio.sleep(TICK)
+            if self._runtime.player.source.live or self._recorder.running:
+                self._deliver(Mailbox.put_state)
 
     def _post(self, put: Callable[..., None], *args: object) -> None:
         loop = self._loop

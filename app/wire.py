@@ -6,10 +6,36 @@ from typing_extensions import TypedDict
 
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
+Kind = Literal["device", "emulator", "recording"]
+
+
+class DeviceJson(TypedDict):
+    """A sensor, what it said of itself, and how well its measurements arrive."""
+
+    port: str
+    name: str
+    serial: str
+    firmware: str
+    hardware: int
+    health: str
+    mode: str
+    modes: list[str]
+    rpm: int
+    baud: int
+    state: Literal["connecting", "streaming", "stalled", "reconnecting", "closed"]
+    error: str | None
+    rate_hz: float
+    samples_per_s: float
+    completeness: float
+    bytes: int
+    revolutions: int
+    reconnects: int
+    overruns: int
+    dropped: dict[str, int]
 
 
 class PositionJson(TypedDict):
-    kind: Literal["simulation", "recording"]
+    kind: Kind
     index: int
     count: int | None
     time: float
@@ -71,6 +97,8 @@ class FrameJson(TypedDict):
     source: PositionJson
     n_beams: int
     n_valid: int
+    completeness: float
+    gaps: list[Pair]
     noise_seen: float
     fitter: str
     covariance: Literal["consistent", "published"]

@@ -7,7 +7,9 @@ from starlette.requests import HTTPConnection
 
 from app.frame import Frame
 from app.library import Library
+from app.live import Taps
 from app.problems import ProblemError
+from app.recorder import AsyncRecorder
 from app.runtime import Runtime
 from app.stream import Hub
 
@@ -27,6 +29,16 @@ def _hub(connection: HTTPConnection) -> Hub:
     return hub
 
 
+def _recorder(connection: HTTPConnection) -> AsyncRecorder:
+    recorder: AsyncRecorder = connection.app.state.recorder
+    return recorder
+
+
+def _taps(connection: HTTPConnection) -> Taps:
+    taps: Taps = connection.app.state.taps
+    return taps
+
+
 def _frame(runtime: Annotated[Runtime, Depends(_runtime)]) -> Frame:
     if runtime.frame is None:
         why = "no scan has been processed" if runtime.ready else "the kernels are still being compiled"
@@ -37,4 +49,6 @@ def _frame(runtime: Annotated[Runtime, Depends(_runtime)]) -> Frame:
 CurrentRuntime = Annotated[Runtime, Depends(_runtime)]
 CurrentLibrary = Annotated[Library, Depends(_library)]
 CurrentHub = Annotated[Hub, Depends(_hub)]
+CurrentRecorder = Annotated[AsyncRecorder, Depends(_recorder)]
+CurrentTaps = Annotated[Taps, Depends(_taps)]
 CurrentFrame = Annotated[Frame, Depends(_frame)]

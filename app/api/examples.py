@@ -25,6 +25,49 @@ SEGMENT = {
     "covariance": [[2.1e-06, -1.0e-07], [-1.0e-07, 2.9e-06]],
 }
 CORNER = {"id": 12, "segments": [0, 1], "selected": True, "by_method": {"ml": MEASURED}}
+DEVICE = {
+    "port": "/dev/ttyUSB0",
+    "name": "RPLIDAR S1",
+    "serial": "A1B2C3D4E5F60718293A4B5C6D7E8F90",
+    "firmware": "1.28",
+    "hardware": 18,
+    "health": "good",
+    "mode": "DenseBoost",
+    "modes": ["Standard", "DenseBoost"],
+    "rpm": 600,
+    "baud": 256000,
+    "state": "streaming",
+    "error": None,
+    "rate_hz": 10.0,
+    "samples_per_s": 9259.0,
+    "completeness": 0.998,
+    "bytes": 1203440,
+    "revolutions": 618,
+    "reconnects": 0,
+    "overruns": 0,
+    "dropped": {"checksum": 2},
+}
+DEVICE_FOUND = {
+    "path": "/dev/ttyUSB0",
+    "description": "CP2102 USB to UART Bridge Controller",
+    "vid_pid": "10c4:ea60",
+    "looks_like": True,
+    "name": "RPLIDAR S1",
+    "serial": "A1B2C3D4E5F60718293A4B5C6D7E8F90",
+    "error": None,
+    "in_use": False,
+}
+RECORDER = {
+    "state": "recording",
+    "name": "2026-11-21_10-00-00.mcap",
+    "raw": False,
+    "size": 812331,
+    "duration": 30.1,
+    "scans": 301,
+    "rate": 27000.0,
+    "dropped": 0,
+    "error": None,
+}
 POSITION = {"kind": "recording", "index": 41, "count": 278, "time": 4.1}
 FRAME: Json = {
     "sequence": 1042,
@@ -32,6 +75,8 @@ FRAME: Json = {
     "source": POSITION,
     "n_beams": 920,
     "n_valid": 903,
+    "completeness": 0.957,
+    "gaps": [[1.204, 1.475]],
     "noise_seen": 0.0187,
     "fitter": "ml",
     "covariance": "consistent",
@@ -55,6 +100,8 @@ FRAME: Json = {
 }
 SOURCE = {
     "kind": "recording",
+    "live": False,
+    "device": None,
     "recording": "demo.bag",
     "topic": "/scan",
     "topics": ["/scan"],
@@ -70,7 +117,12 @@ SOURCE = {
     "speed": 1.0,
     "loop": True,
 }
-RECORDING = {"name": "demo.bag", "size": 10485760, "modified": "2025-04-01T10:00:00+00:00"}
+RECORDING = {
+    "name": "demo.bag",
+    "size": 10485760,
+    "modified": "2025-04-01T10:00:00+00:00",
+    "builtin": False,
+}
 SETTINGS_PATCH = {"extraction": {"fitter": "wctls", "min_points": 8}, "view": {"compare": True}}
 
 

@@ -1,15 +1,18 @@
-"""What plays: the simulation or a recording, and the transport controls."""
+"""What plays: a sensor, the emulator or a recording, and the transport controls."""
 
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Body
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.api.dependencies import CurrentLibrary, CurrentRuntime
+from app.api.dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime, CurrentTaps
 from app.api.examples import SOURCE, ok
+from app.live import DeviceOptions, LiveSource, Taps
 from app.player import SourceJson
 from app.problems import documented
-from app.sources import RecordingSource, SimulationSource
+from app.runtime import Runtime
+from app.sources import RecordingSource
+from lidarcore import DeviceError
 
 router = APIRouter(prefix="/source", tags=["source"])
 
@@ -21,11 +24,28 @@ class _Body(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
-class Simulation(_Body):
-    """The built-in simulated room."""
+Rpm = Annotated[int | None, Field(description="speed of the motor; 600 if not given")]
+Mode = Annotated[str | None, Field(description="scan mode; the one the sensor recommends if not given")]
 
-    kind: Literal["simulation"]
-    paused: bool = False
+
+class Device(_Body):
+    """A sensor at a port."""
+
+    kind: Literal["device"]
+    port: str | None = Field(
+        None, description="path or name of the port; the only sensor connected if not given"
+    )
+    baud: Annotated[int, Field(ge=1200, le=4_000_000)] | None = Field(None, description="256000 if not given")
+    mode: Mode = None
+    rpm: Rpm = None
+
+
+class Emulator(_Body):
+    """An emulated RPLIDAR S1 on a pseudo-terminal, read by the same driver as a real one."""
+
+    kind: Literal["emulator"]
+    mode: Mode = None
+    rpm: Rpm = None
 
 
 class Recording(_Body):
@@ -47,6 +67,7 @@ class Transport(_Body):
         None, description="times as fast as recorded; 0: as fast as possible"
     )
     loop: bool | None = None
+    rpm: int | None = Field(None, description="speed of the sensor's motor")
 
 
 class Step(_Body):
@@ -56,8 +77,15 @@ class Step(_Body):
 
 
 Choice = Annotated[
-    Simulation | Recording,
-    Body(discriminator="kind", examples=[{"kind": "recording", "name": "demo.bag"}, {"kind": "simulation"}]),
+    Device | Emulator | Recording,
+    Body(
+        discriminator="kind",
+        examples=[
+            {"kind": "device", "port": "/dev/ttyUSB0"},
+            {"kind": "emulator"},
+            {"kind": "recording", "name": "demo.bag"},
+        ],
+    ),
 ]
 
 
@@ -67,18 +95,46 @@ def read(runtime: CurrentRuntime) -> SourceJson:
     return runtime.player.describe()
 
 
-@router.put("", responses=ok(SOURCE, "What plays now") | documented(404, 409, 422))
-def play(runtime: CurrentRuntime, library: CurrentLibrary, choice: Choice) -> SourceJson:
-    """Play the simulation or a recording. If that fails, what played before goes on.
+@router.put("", responses=ok(SOURCE, "What plays now") | documented(403, 404, 409, 422, 503, 504))
+def play(
+    runtime: CurrentRuntime,
+    library: CurrentLibrary,
+    recorder: CurrentRecorder,
+    taps: CurrentTaps,
+    choice: Choice,
+) -> SourceJson:
+    """Play a sensor, the emulator or a recording; a recording of the source before ends. If it fails, that goes on.
 
     409 with the member `topics` if the recording has several lidar topics and none was chosen.
     """
-    if isinstance(choice, Simulation):
-        runtime.open(SimulationSource(), paused=choice.paused)
+    if isinstance(choice, Recording):
+        runtime.open(RecordingSource(library.path(choice.name), choice.topic), choice.index, choice.paused)
     else:
-        source = RecordingSource(library.path(choice.name), choice.topic)
-        runtime.open(source, choice.index, choice.paused)
+        _go_live(
+            runtime,
+            DeviceOptions(**choice.model_dump(exclude={"kind"}), emulated=choice.kind == "emulator"),
+            taps,
+        )
+    recorder.stop()
     return runtime.player.describe()
+
+
+def _go_live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> None:
+    """Open the sensor; the one that plays has to let go of its port first, and gets it back if that fails."""
+    playing = runtime.player.source
+    holder = (
+        playing
+        if isinstance(playing, LiveSource) and not options.emulated and playing.holds(options.port)
+        else None
+    )
+    if holder:
+        holder.close()
+    try:
+        runtime.open(LiveSource(options, taps))
+    except DeviceError:
+        if holder:
+            runtime.open(LiveSource(holder.options, taps))
+        raise
 
 
 @router.patch("", responses=ok(SOURCE, "What plays, as it is now") | documented(422))
@@ -88,7 +144,9 @@ def control(
         Transport, Body(examples=[{"state": "paused", "index": 41}, {"speed": 2.0, "loop": False}])
     ],
 ) -> SourceJson:
-    """Play, pause, seek, set speed and loop."""
+    """Play, pause, seek, set speed and loop; or how fast the sensor turns."""
+    if transport.rpm is not None:
+        runtime.player.source.set_speed(transport.rpm)
     runtime.player.control(transport.state, transport.index, transport.speed, transport.loop)
     return runtime.player.describe()
 

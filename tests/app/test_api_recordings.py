@@ -98,7 +98,7 @@ def test_what_no_reader_takes_is_refused_with_its_reason_and_leaves_nothing(
     assert files(server.folder) == ["recordings"]
     assert not Path("pwned").exists()
     after = server.next_frame()
-    assert after["source"]["kind"] == "simulation"
+    assert after["source"]["kind"] == "emulator"
     assert after["sequence"] > before["sequence"]
 
 
@@ -145,7 +145,7 @@ def test_a_recording_given_at_the_start_plays_and_is_listed_but_not_deleted(
     assert_problem(server.http.delete("/recordings/elsewhere.npz"), 409)
     assert_problem(server.http.put("/recordings/elsewhere.npz?overwrite=1", content=given.read_bytes()), 409)
     assert given.exists()
-    server.change("PUT", "/source", {"kind": "simulation"})
+    server.change("PUT", "/source", {"kind": "emulator"})
     assert server.play(given)["source"]["kind"] == "recording"
 
 

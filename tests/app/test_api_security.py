@@ -12,7 +12,7 @@ EVIL = "http://evil.example"
 TOKEN = "s3cret-t0ken"
 MUTATIONS = [
     ("PATCH", "/settings", {"view": {"rotate": True}}),
-    ("PUT", "/source", {"kind": "simulation"}),
+    ("PUT", "/source", {"kind": "emulator"}),
     ("PATCH", "/source", {"loop": False}),
     ("POST", "/source/step", {"by": 1}),
     ("PUT", "/selection", {"corner": None}),

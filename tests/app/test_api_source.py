@@ -187,7 +187,7 @@ def test_of_several_lidars_one_is_to_be_chosen(server: Server) -> None:
     body = {"kind": "recording", "name": bag.name}
     problem = assert_problem(server.http.put("/source", json=body), 409)
     assert problem["topics"] == ["/front", "/rear"]
-    assert server.get("/source")["kind"] == "simulation"
+    assert server.get("/source")["kind"] == "emulator"
     assert_problem(server.http.put("/source", json=body | {"topic": "/nose"}), 409)
     assert server.play(bag, topic="/rear")["n_beams"] == 180
     assert server.get("/source")["topic"] == "/rear"
@@ -211,7 +211,7 @@ def test_a_file_that_breaks_off_plays_as_far_as_it_goes(server: Server, hokuyo: 
         ("PUT", "/source", {"kind": "recording"}),
         ("PUT", "/source", {"kind": "recording", "name": "../../etc/passwd"}),
         ("PUT", "/source", {"kind": "recording", "name": "room.npz", "index": -1}),
-        ("PUT", "/source", {"kind": "simulation", "name": "room.npz"}),
+        ("PUT", "/source", {"kind": "emulator", "name": "room.npz"}),
         ("PATCH", "/source", {"speed": 0.05}),
         ("PATCH", "/source", {"speed": 101}),
         ("PATCH", "/source", {"speed": -1}),

@@ -43,7 +43,7 @@ def test_every_change_is_told_to_every_client(server: Server) -> None:
             ),
             ("PATCH", "/source", {"speed": 2}, lambda s: s["source"]["speed"] == 2),
             ("PATCH", "/source", {"state": "paused"}, lambda s: s["source"]["state"] == "paused"),
-            ("PUT", "/source", {"kind": "simulation"}, lambda s: s["source"]["state"] == "playing"),
+            ("PUT", "/source", {"kind": "emulator"}, lambda s: s["source"]["state"] == "playing"),
         ]:
             server.change(method, path, body)
             assert one.state(holds)

@@ -1,0 +1,61 @@
+"""Recording the sensor that plays."""
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Body
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.api.dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime
+from app.api.examples import RECORDER, ok
+from app.live import LiveSource
+from app.problems import ProblemError, documented
+from app.recorder import RecorderJson
+
+router = APIRouter(prefix="/recorder", tags=["recorder"])
+
+SUFFIX, RAW_SUFFIX = ".mcap", ".rplidar"
+
+
+class Start(BaseModel):
+    """What to record."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+    name: str | None = Field(
+        None, description="file name in the recordings folder; date and time if not given"
+    )
+    raw: bool = Field(False, description="also the bytes from the port, in a file of their own")
+
+
+@router.get("", responses=ok(RECORDER, "What is recorded, or was recorded last"))
+def read(recorder: CurrentRecorder) -> RecorderJson:
+    """What is recorded, or was recorded last."""
+    return recorder.status
+
+
+@router.post("/start", responses=ok(RECORDER, "What is recorded now") | documented(409, 422, 507))
+def start(
+    runtime: CurrentRuntime,
+    library: CurrentLibrary,
+    recorder: CurrentRecorder,
+    start: Annotated[Start, Body(examples=[{}, {"name": "hall.mcap", "raw": True}])],
+) -> RecorderJson:
+    """Record the live source from now on into the recordings folder, as MCAP that ROS 2 tools open."""
+    source = runtime.player.source
+    if not isinstance(source, LiveSource):
+        raise ProblemError(409, "A recording plays: only a device or the emulator can be recorded.")
+    name = start.name or f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
+    path = library.new(name if name.endswith(SUFFIX) else name + SUFFIX)
+    raw = library.new(path.stem + RAW_SUFFIX) if start.raw else None
+    scale = runtime.settings.view.ellipse_scale
+    recorder.start(path, raw=raw, stream=source.stream, sensor=source.device()["name"], ellipse_scale=scale)
+    runtime.announce()
+    return recorder.status
+
+
+@router.post("/stop", responses=ok(RECORDER, "What was recorded"))
+def stop(runtime: CurrentRuntime, recorder: CurrentRecorder) -> RecorderJson:
+    """End the recording; without one this does nothing."""
+    status = recorder.stop()
+    runtime.announce()
+    return status

@@ -1,0 +1,60 @@
+"""Options that several commands share, and the settings they make."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from app.settings import Settings
+
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="a setting, e.g. gap=0.2 or noise.sigma_range=0.01"),
+]
+SettingsFile = Annotated[
+    Path | None,
+    typer.Option("--settings", help="a JSON file of settings, as GET /api/v1/settings gives them"),
+]
+
+
+def settings_from(file: Path | None, assignments: list[str] | None) -> "Settings":
+    """The defaults, changed by the file, changed by each NAME=VALUE."""
+    from app.settings import Settings
+
+    settings = Settings()
+    if file is not None:
+        settings = settings.patched(_read_settings(file))
+    for assignment in assignments or []:
+        settings = settings.patched(_patch(assignment))
+    return settings
+
+
+def _read_settings(file: Path) -> dict[str, Any]:
+    from lidarcore import LidarError
+
+    try:
+        settings = json.loads(file.read_text("utf-8"))
+    except ValueError as error:  # not text, or not JSON
+        raise LidarError(f"{file} is no JSON file: {error}.") from error
+    if not isinstance(settings, dict):
+        raise LidarError(f"{file} should hold an object, as GET /api/v1/settings gives it.")
+    return settings
+
+
+def _patch(assignment: str) -> dict[str, Any]:
+    """'gap=0.2' or 'view.theme=light' as a merge patch; names without a section are of the extraction."""
+    name, equals, text = assignment.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"{assignment!r} should be NAME=VALUE, e.g. gap=0.2.")
+    try:
+        patch = json.loads(text)
+    except json.JSONDecodeError:
+        patch = text
+    path = name.split(".")
+    if path[0] not in ("extraction", "view"):
+        path.insert(0, "extraction")
+    for part in reversed(path):
+        patch = {part: patch}
+    return dict(patch)

@@ -1,0 +1,186 @@
+"""The live source: an RPLIDAR at a port, or an emulated one, through the same driver."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from typing import Literal
+
+from app.sources import Source
+from app.wire import DeviceJson
+from lidarcore import DeviceError, Scan
+from lidarcore.rplidar import Driver, find_devices
+from lidarcore.rplidar.capture import Stream
+from lidarcore.rplidar.driver import BAUD
+from lidarcore.rplidar.emulator_process import EmulatorProcess
+from lidarcore.rplidar.port import Tap
+
+HISTORY = 200  # revolutions kept for stepping back
+
+
+@dataclass(frozen=True)
+class DeviceOptions:
+    """Which sensor, and how to run it. None leaves it to the driver."""
+
+    port: str | None = None
+    baud: int | None = None
+    mode: str | None = None
+    rpm: int | None = None
+    emulated: bool = False
+
+
+@dataclass(frozen=True)
+class Taps:
+    """Who else is told of what a live source produces: of every scan, and of every byte."""
+
+    scan: Callable[[Scan], None] = lambda scan: None
+    bytes: Tap = lambda direction, time, data: None
+
+
+class LiveSource(Source):
+    """Revolutions as they come, numbered from 0; the last HISTORY can be stepped back to.
+
+    Connects when made, and streams from `start` on; raises DeviceError if there is no sensor to talk to.
+    """
+
+    live = True
+
+    def __init__(self, options: DeviceOptions, taps: Taps) -> None:
+        self.options = options
+        self.kind: Literal["device", "emulator"] = "emulator" if options.emulated else "device"
+        self._taps = taps
+        self._changed: Callable[[], None] = lambda: None
+        self.emulator = EmulatorProcess() if options.emulated else None
+        try:
+            self._driver = Driver(
+                self.emulator.port if self.emulator else options.port,
+                baud=options.baud or BAUD,
+                mode=options.mode,
+                rpm=options.rpm,
+                tap=taps.bytes,
+                on_change=lambda: self._changed(),
+            ).__enter__()
+        except BaseException:
+            self._end_emulator()
+            raise
+        self._lock = threading.Lock()
+        self._kept: deque[tuple[Scan, float]] = deque(maxlen=HISTORY)
+        self._first_stamp = 0.0
+        self._made = 0
+
+    @property
+    def count(self) -> int:
+        return self._made
+
+    @property
+    def stream(self) -> Stream:
+        """What one has to know to understand the bytes from here on."""
+        mode = self._driver.mode
+        return Stream(mode.answer_type, mode.us_per_sample, self._driver.baud)
+
+    def nearest(self, index: int) -> int:
+        return max(self._made - len(self._kept), min(index, self._made - 1), 0)
+
+    def scan(self, index: int) -> Scan | None:
+        return kept[0] if (kept := self._at(index)) else None
+
+    def arrival(self, index: int) -> float:
+        return kept[1] if (kept := self._at(index)) else time.monotonic()
+
+    def time(self, index: int) -> float:
+        return kept[0].stamp - self._first_stamp if (kept := self._at(index)) else 0.0
+
+    def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
+        self._changed = progress
+        threading.Thread(target=self._follow, args=(arrived,), name="live", daemon=True).start()
+
+    def close(self) -> None:
+        self._driver.close()
+        self._end_emulator()
+
+    def set_speed(self, rpm: int) -> None:
+        self._driver.set_speed(rpm)
+
+    def holds(self, port: str | None) -> bool:
+        """Whether opening that port (None: the only one connected) would find it taken by this source."""
+        return self.kind == "device" and port in (None, self.options.port, self._driver.port)
+
+    def device(self) -> DeviceJson:
+        driver, statistics = self._driver, self._driver.statistics
+        return {
+            "port": driver.port,
+            "name": driver.info.name,
+            "serial": driver.info.serial,
+            "firmware": driver.info.version,
+            "hardware": driver.info.hardware,
+            "health": driver.health.name,
+            "mode": driver.mode.name,
+            "modes": [mode.name for mode in driver.modes],
+            "rpm": driver.rpm,
+            "baud": driver.baud,
+            "state": driver.state,
+            "error": driver.error,
+            "rate_hz": statistics.rate_hz,
+            "samples_per_s": statistics.samples_per_s,
+            "completeness": statistics.completeness,
+            "bytes": statistics.bytes,
+            "revolutions": statistics.revolutions,
+            "reconnects": statistics.reconnects,
+            "overruns": statistics.overruns,
+            "dropped": dict(statistics.dropped),
+        }
+
+    def _follow(self, arrived: Callable[[], None]) -> None:
+        try:
+            for revolution in self._driver.revolutions():
+                scan = revolution.scan(time.time() - time.monotonic())
+                with self._lock:
+                    self._first_stamp = self._first_stamp or scan.stamp
+                    self._kept.append((scan, revolution.arrival))
+                    self._made += 1
+                arrived()
+                self._taps.scan(scan)
+        except DeviceError as error:
+            self.error = str(error)
+            self._changed()
+
+    def _at(self, index: int) -> tuple[Scan, float] | None:
+        with self._lock:
+            place = index - (self._made - len(self._kept))
+            return self._kept[place] if 0 <= place < len(self._kept) else None
+
+    def _end_emulator(self) -> None:
+        if self.emulator:
+            self.emulator.close()
+
+
+def connected_or_emulated(options: DeviceOptions, taps: Taps) -> tuple[LiveSource, list[str]]:
+    """The sensor asked for; if none is, the one connected, else an emulated one; and what there is to say of it.
+
+    Raises DeviceError if a port was named and there is no sensor to talk to.
+    """
+    if options.port is not None or options.emulated:
+        source = LiveSource(options, taps)
+        return source, [_said(source)]
+    said = []
+    for path in islice(_promising(), 8):
+        try:
+            source = LiveSource(DeviceOptions(path, options.baud, options.mode, options.rpm), taps)
+        except DeviceError as error:
+            said.append(str(error))
+        else:
+            return source, [*said, _said(source)]
+    source = LiveSource(DeviceOptions(mode=options.mode, rpm=options.rpm, emulated=True), taps)
+    return source, [*said, f"No RPLIDAR is connected: {_said(source)}"]
+
+
+def _promising() -> Iterator[str]:
+    return (device.path for device in find_devices(ask=False) if device.looks_like)
+
+
+def _said(source: LiveSource) -> str:
+    device = source.device()
+    what = "an emulated RPLIDAR S1" if source.emulator else f"{device['name']}, serial {device['serial']},"
+    return f"{what} at {device['port']} plays."

@@ -1,0 +1,75 @@
+"""`lidarcore record` as a process of its own, on an emulated sensor."""
+
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from lidarcore import open_recording
+from lidarcore.rplidar.emulator_process import EmulatorProcess
+
+COMMAND = [sys.executable, "-m", "app.cli", "record"]
+
+
+def run(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+
+
+def test_it_records_for_a_while_and_says_how_much(tmp_path):
+    output, raw = tmp_path / "a.mcap", tmp_path / "a.rplidar"
+    done = run(output, "--emulator", "--duration", 2, "--raw", raw, "--set", "gap=0.3")
+    assert done.returncode == 0, done.stderr
+    scans = list(open_recording(output))
+    assert 15 <= len(scans) <= 25
+    assert scans[-1].stamp - scans[0].stamp == pytest.approx(2, abs=0.5)
+    assert abs(scans[-1].stamp - time.time()) < 60
+    assert re.search(rf"a\.mcap: {len(scans)} scans in \d\.\d s, \d\.\d MB, \d+ kB/s$", done.stdout.strip())
+    captured = {round(scan.stamp, 2): len(scan) for scan in open_recording(raw)}
+    assert sum(captured.get(round(scan.stamp, 2)) == len(scan) for scan in scans) >= len(scans) - 2
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_properly(tmp_path, number):
+    output = tmp_path / "a.mcap"
+    with EmulatorProcess() as emulator:
+        process = subprocess.Popen(
+            [*COMMAND, output, "--port", emulator.port], stdout=subprocess.PIPE, text=True
+        )
+        deadline = time.monotonic() + 60
+        while not (output.exists() and output.stat().st_size):
+            assert time.monotonic() < deadline
+            assert process.poll() is None
+            time.sleep(0.05)
+        process.send_signal(number)
+        said, _ = process.communicate(timeout=20)
+    assert process.returncode == 0
+    recording = open_recording(output)
+    count = len(list(recording))
+    assert f"{count} scans" in said
+    assert count > 0
+    assert recording.notes == ()
+
+
+def test_an_existing_file_is_refused_before_anything_turns(tmp_path):
+    (tmp_path / "a.mcap").write_text("precious")
+    done = run(tmp_path / "a.mcap", "--port", tmp_path / "no port")
+    assert done.returncode == 2
+    assert "a.mcap exists already: give the recording another name" in done.stderr
+    assert (tmp_path / "a.mcap").read_text() == "precious"
+
+
+def test_without_the_sensor_nothing_is_left(tmp_path):
+    done = run(tmp_path / "a.mcap", "--port", "/dev/ttyNothing", "--raw", tmp_path / "a.rplidar")
+    assert done.returncode == 2
+    assert "/dev/ttyNothing" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_port_and_emulator_exclude_each_other(tmp_path):
+    done = run(tmp_path / "a.mcap", "--port", "x", "--emulator")
+    assert done.returncode == 2
+    assert "not both" in done.stderr
