@@ -7,10 +7,10 @@ PORT ?= 8000
 RECORDING ?=
 bin := .venv/bin
 
-.PHONY: run test lint bench lock clean
+.PHONY: run test lint bench demo lock clean
 
 run: .venv/.run
-	$(bin)/lidarcore serve --host $(HOST) --port $(PORT) $(if $(RECORDING),"$(RECORDING)")
+	$(bin)/lidarcore serve --host $(HOST) --http-port $(PORT) $(if $(RECORDING),"$(RECORDING)")
 
 test: .venv/.dev lint
 	@command -v chromium >/dev/null || { $(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends chromium fonts-dejavu-core; }
@@ -23,6 +23,11 @@ lint: .venv/.dev
 
 bench: .venv/.run
 	$(bin)/lidarcore bench
+
+# What the wheel ships as a demo: an emulated sensor that moves, recorded as a real one would be.
+demo: .venv/.run
+	rm -f app/demo/emulated-s1.mcap && link=$$(mktemp -u) && (sleep 60 | $(bin)/lidarcore emulate --moving --seed 7 --link $$link & sleep 3; \
+	$(bin)/lidarcore record app/demo/emulated-s1.mcap --port $$link --duration 12)
 
 # Debian keeps venv in a package of its own.
 .venv/bin/python:

@@ -44,6 +44,16 @@ export function swatch(method) {
   return patch;
 }
 
+/** Makes a node's children anew only when what they show has changed: until then focus and open lists stay. */
+export function remake(node, shown, make) {
+  const key = JSON.stringify(shown);
+  if (node.shown === key) return;
+  node.shown = key;
+  const held = node.contains(document.activeElement) ? document.activeElement.dataset.key : null;
+  node.replaceChildren(...make());
+  if (held) node.querySelector(`[data-key="${CSS.escape(held)}"]`)?.focus();
+}
+
 /** Writes text only where it differs, into the text node that is there: nothing is laid out for an equal value. */
 export function setText(node, text) {
   const value = String(text);

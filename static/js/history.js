@@ -1,14 +1,27 @@
 // The last frames' figures, for the plots: bounded, in order of arrival.
 
 const LENGTH = 600;
+const LATELY = 300; // frames, half a minute
 
 const samples = [];
 
-/** Notes a frame's figures; `now` in seconds. */
-export function remember(frame, now = performance.now() / 1000) {
-  const { extract_us: extract, draw_us: draw, age_ms: age } = frame.timings;
-  samples.push({ now, extract, draw, age: age * 1e3, summary: frame.summary });
+/** Notes a frame's figures, its age only if it was sent when it was made; `now` in seconds. */
+export function remember(frame, isNew, now = performance.now() / 1000) {
+  const { extract_us: extract, draw_us: draw, age_ms } = frame.timings;
+  const age = isNew ? age_ms * 1e3 : NaN;
+  samples.push({ now, extract, draw, age, summary: frame.summary, kind: frame.source.kind });
   if (samples.length > LENGTH) samples.shift();
+}
+
+/** The value below which such a part of a figure lies, over the last frames of this kind of source. */
+export function quantile(read, part) {
+  const { kind } = samples.at(-1) ?? {};
+  const values = samples
+    .slice(-LATELY)
+    .filter((sample) => sample.kind === kind)
+    .map(read);
+  const known = values.filter(Number.isFinite);
+  return known.sort((a, b) => a - b)[Math.floor(part * known.length)] ?? NaN;
 }
 
 /** Columns for a plot: seconds before the newest frame, then one column per reader of a sample. */

@@ -1,4 +1,4 @@
-// The address keeps the view: recording, position, methods, layers and every parameter that is not the default.
+// The address keeps the view: recording and position, or that it is live, methods, layers and every parameter that is not the default.
 // Opening such an address reproduces the view; what it leaves out is at its default.
 
 import { isExtractionNumber } from "./parameters.js";
@@ -48,7 +48,7 @@ function encode(source, settings, fields) {
     link.set("recording", source.recording);
     if (source.topic && source.topics?.length > 1) link.set("topic", source.topic);
     link.set("index", source.index);
-  } else link.set("source", source.kind);
+  } else link.set("live", source.kind);
   for (const { name, path, preset } of carried(fields)) {
     const value = at(settings, path);
     if (String(value) !== String(preset)) link.set(name, value);
@@ -63,7 +63,7 @@ function encode(source, settings, fields) {
 /** The source and the settings a hash asks for; null if it asks for none. */
 function decode(hash, fields) {
   const link = new URLSearchParams(hash.replace(/^#/, ""));
-  if (!link.has("recording") && !link.has("source")) return null;
+  if (!link.has("recording") && !link.has("live")) return null;
   const changes = carried(fields).map(({ name, path, read, preset }) =>
     nest(path, link.has(name) ? read(link.get(name)) : preset),
   );
@@ -75,7 +75,7 @@ function decode(hash, fields) {
 }
 
 function sourceOf(link) {
-  if (!link.has("recording")) return { kind: "simulation" };
+  if (!link.has("recording")) return { kind: link.get("live") === "device" ? "device" : "emulator" };
   const source = {
     kind: "recording",
     name: link.get("recording"),
@@ -102,11 +102,11 @@ async function follow({ reloaded }) {
   } else await open(wanted.source);
 }
 
-function isOpen({ kind, name = null, topic = null }) {
+/** A live view is whatever is live now: nobody's lidar is taken away by an address. */
+function isOpen({ kind, name, topic = null }) {
   const source = get("source");
-  return (
-    source.kind === kind && (source.recording ?? null) === name && (topic === null || source.topic === topic)
-  );
+  if (kind !== "recording") return source.live;
+  return source.recording === name && (topic === null || source.topic === topic);
 }
 
 let timer = 0;

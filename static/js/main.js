@@ -3,6 +3,10 @@
 import { request } from "./api.js";
 import { mountColours } from "./colours.js";
 import { mountCorners } from "./corners.js";
+import { mountDevice } from "./device.js";
+import { mountDevices } from "./devices.js";
+import { mountDial } from "./dial.js";
+import { mountFaults } from "./faults.js";
 import { mountHeader } from "./header.js";
 import { remember } from "./history.js";
 import { mountLink } from "./link.js";
@@ -13,8 +17,9 @@ import { mountRecordings } from "./recordings.js";
 import { mountRejections } from "./rejections.js";
 import { mountScene } from "./scene.js";
 import { fieldsOf } from "./schema.js";
-import { attempt, settings, transport } from "./session.js";
+import { attempt, isPlaying, settings, transport } from "./session.js";
 import { mountShortcuts, press } from "./shortcuts.js";
+import { mountSource } from "./source.js";
 import { get, set } from "./store.js";
 import { connect } from "./stream.js";
 import { mountTabs } from "./tabs.js";
@@ -28,18 +33,31 @@ mountColours();
 mountTabs();
 mountHeader();
 mountScene(press);
+mountDial();
 mountTimeline();
 mountMethod();
 mountView();
 mountParameters();
 mountCorners();
 mountPlots();
+mountSource();
+mountDevice();
+mountFaults();
+mountDevices();
 mountRecordings();
 mountUpload();
 mountRejections();
 mountShortcuts();
 
-connect({ onOpen: learn, onState: accept, onFrame: show });
+set("opening", null);
+connect({ onOpen: join, onState: accept, onFrame: show });
+
+let joining; // no frame has come yet over this connection
+
+function join() {
+  joining = true;
+  learn();
+}
 
 /** What never changes while a server runs; asked for once, at the first connection that succeeds. */
 async function learn() {
@@ -68,11 +86,15 @@ function accept(state) {
   settings.accept(state.settings);
   transport.accept(state.source);
   set("selection", state.selection);
+  set("recorder", state.recorder);
   set("ready", state.ready);
   known();
 }
 
+/** A frame is late by more than its way here if it comes first over a connection, again, or while paused. */
 function show(frame) {
-  remember(frame);
+  const isNew = frame.stamp !== get("frame")?.stamp;
+  remember(frame, isNew && !joining && isPlaying(get("source")));
+  joining = false;
   set("frame", frame);
 }

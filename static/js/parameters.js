@@ -26,8 +26,12 @@ export function mountParameters() {
   });
   on(["frame", "settings", "fields"], (frame) => {
     const told = setting("extraction.noise.sigma_range");
-    const doubt = frame.noise_seen > MUCH_MORE * told ? ": more than told, so the ellipses claim too much" : "";
-    setText($("noise-seen"), `Range noise seen in this scan: ${(1e3 * frame.noise_seen).toFixed(1)} mm${doubt}.`);
+    const doubt =
+      frame.noise_seen > MUCH_MORE * told ? ": more than told, so the ellipses claim too much" : "";
+    setText(
+      $("noise-seen"),
+      `Range noise seen in this scan: ${(1e3 * frame.noise_seen).toFixed(1)} mm${doubt}.`,
+    );
   });
   on(["settings", "fields"], () => {
     $("reset").disabled = get("fields").filter(isExtractionNumber).every(isDefault);

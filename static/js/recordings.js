@@ -1,26 +1,15 @@
-// The recordings in the server's folder, and what is known about the one that plays.
+// The recordings that can be played: those in the server's folder, and the one that comes with the program.
 
 import { request } from "./api.js";
-import { $, el, iconButton } from "./dom.js";
-import { nameOf } from "./header.js";
+import { $, el, iconButton, remake } from "./dom.js";
 import { attempt, open } from "./session.js";
 import { on, set } from "./store.js";
 import { toast } from "./toasts.js";
 import { bytes } from "./units.js";
 
 export function mountRecordings() {
-  on(["source"], drawSource);
-  on(["source"], ({ error }) => tell(error));
-  on(["recordings", "source"], drawLibrary);
-  on(["panel"], (panel) => panel === "recordings" && refreshRecordings());
-}
-
-let told = null;
-
-/** What goes wrong while a recording plays is told once, wherever the user looks. */
-function tell(error) {
-  if (error && error !== told) toast(error, { title: "The recording cannot be read on", kind: "error" });
-  told = error;
+  on(["recordings", "source", "recorder"], drawLibrary);
+  on(["panel"], (panel) => panel === "sources" && refreshRecordings());
 }
 
 export async function refreshRecordings() {
@@ -28,64 +17,36 @@ export async function refreshRecordings() {
   if (listing) set("recordings", listing);
 }
 
-function drawSource(source) {
-  const facts = [nameOf(source), source.format, source.topic].filter(Boolean).join(" · ");
-  const notes = (source.notes ?? []).map((note) => el("li", {}, note));
-  $("source").replaceChildren(
-    $("source").querySelector("h2"),
-    el("p", {}, facts),
-    ...(source.error ? [el("p", { class: "fault", role: "alert" }, source.error)] : []),
-    ...(notes.length ? [el("ul", { class: "notes" }, ...notes)] : []),
-    ...topicRows(source),
-  );
-}
-
-function topicRows({ recording, topic, topics }) {
-  if (!(topics?.length > 1)) return [];
-  const list = el(
-    "select",
-    { id: "topic" },
-    ...topics.map((name) => el("option", { value: name, selected: name === topic }, name)),
-  );
-  list.addEventListener("change", () => open({ kind: "recording", name: recording, topic: list.value }));
-  return [el("div", { class: "row" }, el("label", { for: "topic" }, "Lidar topic"), list)];
-}
-
-function drawLibrary({ folder, recordings }, source) {
-  const rows = recordings.map((recording) => libraryRow(recording, source));
-  const simulated = source.kind === "simulation";
-  const simulation = el(
-    "li",
-    {},
-    playButton("Simulated room", "endless", simulated, () => open({ kind: "simulation" })),
-  );
-  $("library").replaceChildren(
-    $("library").querySelector("h2"),
-    el("ul", { class: "library" }, simulation, ...rows),
+function drawLibrary({ folder, recordings }, source, recorder) {
+  const playing = source.recording;
+  const growing = recorder.state === "recording" ? stem(recorder.name) : null;
+  remake($("library-list"), [folder, recordings, playing, growing], () => [
+    el("ul", { class: "entries" }, ...recordings.map((recording) => row(recording, playing, growing))),
     el("p", { class: "muted" }, `Files in ${folder}`),
-  );
+  ]);
 }
 
-function libraryRow({ name, size }, source) {
-  const current = source.recording === name;
-  const remove = iconButton("delete", `Delete ${name}`, () => confirmDelete(name));
-  remove.disabled = current;
-  return el(
-    "li",
-    {},
-    playButton(name, bytes(size), current, () => open({ kind: "recording", name })),
-    remove,
-  );
-}
+/** A raw capture beside a recording has its name but for the ending. */
+const stem = (name) => name.replace(/\.[^.]*$/, "");
 
-function playButton(name, about, current, onclick) {
+function row({ name, size, builtin = false }, playing, growing) {
+  if (stem(name) === growing) return el("li", {}, entryText(name, "is being recorded"));
+  const current = name === playing;
+  const about = builtin ? `demo, ${bytes(size)}` : bytes(size);
   const button = el(
     "button",
-    { type: "button", class: "recording", onclick },
-    el("span", {}, name),
-    el("small", {}, about),
+    { type: "button", class: "entry", "data-key": name, onclick: () => open({ kind: "recording", name }) },
+    ...entryText(name, about).childNodes,
   );
   if (current) button.setAttribute("aria-current", "true");
+  return el("li", {}, button, ...(builtin ? [] : [deleteButton(name, current)]));
+}
+
+const entryText = (name, about) => el("p", { class: "entry" }, el("span", {}, name), el("small", {}, about));
+
+function deleteButton(name, disabled) {
+  const button = iconButton("delete", `Delete ${name}`, () => confirmDelete(name));
+  button.disabled = disabled;
   return button;
 }
 

@@ -19,19 +19,28 @@ export function changeSetting(path, value) {
 
 export const toggleSetting = (path) => changeSetting(path, !setting(path));
 
+const NOT_OPENED = {
+  device: "The device could not be opened",
+  emulator: "The emulator could not be started",
+  recording: "The recording could not be opened",
+};
+
 /** Opens a source, asking for the topic where several fit. Resolves to whether it plays. */
 export async function open(source) {
+  set("opening", source);
   try {
     await request("PUT", "source", source);
     return true;
   } catch (problem) {
     const topics = problem instanceof Problem && problem.members.topics;
     if (!topics?.length) {
-      report(problem);
+      report(problem, NOT_OPENED[source.kind]);
       return false;
     }
     const topic = await chooseTopic(source.name, topics);
     return topic ? open({ ...source, topic }) : false;
+  } finally {
+    set("opening", null);
   }
 }
 

@@ -3,6 +3,7 @@
 import { selectNeighbour } from "./corners.js";
 import { $, el } from "./dom.js";
 import { toggleMethod } from "./method.js";
+import { toggleRecording } from "./recorder.js";
 import { fitScene } from "./scene.js";
 import { changeSetting, select, setting, step, togglePlaying, toggleSetting, transport } from "./session.js";
 import { get } from "./store.js";
@@ -25,8 +26,9 @@ const SHORTCUTS = [
     about: "Step back, forward",
     run: (key) => step(key === "ArrowLeft" ? -1 : 1),
   },
-  { keys: ["Home"], about: "Back to the first scan", run: () => transport.patch({ index: 0 }) },
+  { keys: ["Home"], about: "Back to the first scan", run: toFirst },
   { keys: ["l"], about: "Loop", run: () => transport.patch({ loop: !get("source").loop }) },
+  { keys: ["w"], about: "Record, stop recording", run: toggleRecording },
   { keys: ["1", "…", "6"], about: "Fitter", run: chooseFitter },
   { keys: ["⇧1", "…", "⇧6"], about: "Show a method in the comparison" },
   { keys: ["c"], about: "Compare methods", run: () => toggleSetting("view.compare") },
@@ -94,6 +96,11 @@ function compareWith(digit) {
   const name = fitterOf(digit);
   if (name) toggleMethod(name);
   return Boolean(name);
+}
+
+/** The first scan there is; of a live source that is the oldest one kept. */
+function toFirst() {
+  transport.patch(get("source").live ? { index: 0, state: "paused" } : { index: 0 });
 }
 
 function swapCovariance() {

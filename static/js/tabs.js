@@ -16,13 +16,14 @@ export function mountTabs() {
   arrange();
 }
 
-/** Shows one panel by its id. */
-export function showPanel(id) {
+/** Shows one panel by its id; `focus` moves the focus to its tab. */
+export function showPanel(id, { focus = false } = {}) {
   $("main").dataset.tab = id;
   for (const tab of document.querySelectorAll('[role="tab"]')) {
     const chosen = tab.getAttribute("aria-controls") === id;
     tab.setAttribute("aria-selected", String(chosen));
     tab.tabIndex = chosen ? 0 : -1;
+    if (chosen && focus) tab.focus();
   }
   set("panel", id);
 }

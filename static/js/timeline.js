@@ -1,9 +1,12 @@
-// Transport: play, step, seek, speed, loop. A simulation has no end, so it has no seeking.
+// Transport: play, step, seek, speed, loop. A live source has no end: pausing freezes it, the last scans can be
+// stepped back through, and playing jumps to what is live.
 
 import { $, el, iconButton, setIcon, setText } from "./dom.js";
+import { stateOf } from "./live.js";
+import { recorderControls } from "./recorder.js";
 import { isPlaying, step, togglePlaying, transport } from "./session.js";
 import { on } from "./store.js";
-import { clock } from "./units.js";
+import { clock, wholeNumber } from "./units.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 5, 10, 100];
 const AS_FAST_AS_POSSIBLE = 0;
@@ -21,6 +24,7 @@ const seek = el("input", {
 const time = el("output", { id: "time", for: "seek" }, "0:00.0");
 const duration = el("span", { id: "duration", class: "muted" });
 const position = el("output", { id: "position", for: "seek" }, "");
+const badge = el("span", { id: "live", class: "state" });
 const speed = el("select", { "aria-label": "Speed", title: "Speed", id: "speed" });
 const loop = iconButton("loop", "Play in a loop", () =>
   transport.patch({ loop: loop.getAttribute("aria-pressed") !== "true" }),
@@ -34,9 +38,11 @@ export function mountTimeline() {
   $("timeline").append(
     el("div", { class: "buttons" }, back, play, forward),
     el("div", {}, time, duration),
+    badge,
     seek,
     position,
     el("div", { class: "buttons pace" }, speed, loop),
+    recorderControls(),
   );
   on(["source"], drawSource);
   on(["source", "frame"], drawPosition);
@@ -45,14 +51,20 @@ export function mountTimeline() {
 function drawSource(source) {
   const playing = isPlaying(source);
   setIcon(play, playing ? "pause" : "play");
-  play.setAttribute("aria-label", playing ? "Pause" : "Play");
-  play.title = playing ? "Pause" : "Play";
-  const simulated = source.kind === "simulation";
-  $("timeline").classList.toggle("simulated", simulated);
-  for (const control of [seek, back]) control.hidden = simulated;
+  const label = playing ? "Pause" : source.live ? "Back to live" : "Play";
+  play.setAttribute("aria-label", label);
+  play.title = label;
+  $("timeline").classList.toggle("live", source.live);
+  badge.dataset.state = source.state === "paused" ? "paused" : stateOf(source);
+  setText(badge, badgeText(source));
   setText(duration, source.duration ? ` / ${clock(source.duration)}` : "");
   loop.setAttribute("aria-pressed", String(source.loop));
   if (document.activeElement !== speed) showSpeed(source.speed);
+}
+
+function badgeText({ state, device }) {
+  if (state === "paused") return "Paused";
+  return device?.state === "streaming" ? "Live" : "No signal";
 }
 
 /** A speed set elsewhere may be none of ours. */
@@ -67,8 +79,7 @@ function drawPosition(source, frame) {
   const current = frame.source.kind === source.kind ? frame.source : source;
   const index = transport.pending().index ?? current.index;
   setText(time, clock(current.time));
-  if (source.kind === "simulation")
-    return setText(position, source.state === "paused" ? "paused" : "simulation");
+  if (source.live) return setText(position, `scan ${wholeNumber(index + 1)}`);
   seek.max = String(Math.max(0, (source.count ?? 1) - 1));
   seek.setAttribute("aria-valuetext", `scan ${index + 1} of ${source.count}, ${clock(current.time)}`);
   if (!seek.matches(":active")) seek.value = String(index);

@@ -21,11 +21,11 @@ export function toast(text, { title = "", kind = "info", action = null } = {}) {
   if (kind !== "error" && !action) setTimeout(() => node.remove(), LINGER_MS);
 }
 
-/** Shows what went wrong, in the words of the server where it has some. */
-export function report(error) {
+/** Shows what went wrong, in the words of the server where it has some, under a better title if there is one. */
+export function report(error, title = error.title ?? "Something went wrong") {
   if (!(error instanceof Error)) throw error;
   console.warn(error.message);
-  toast(error.message, { title: error.title ?? "Something went wrong", kind: "error" });
+  toast(error.message, { title, kind: "error" });
 }
 
 function actionButton(node, { label, run }) {

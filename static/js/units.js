@@ -27,6 +27,18 @@ export function microseconds(value) {
   return `${scaled.toFixed(scaled < 10 ? 2 : scaled < 100 ? 1 : 0)}\u2009${unit}`;
 }
 
+/** A duration given in microseconds, in milliseconds. */
+export const milliseconds = (value) => `${fixed(value / 1e3, 1)}\u2009ms`;
+
+/** A share of one; what is not whole is never shown as 100 %. */
+export function percent(share) {
+  const shown = share < 1 ? Math.min(99.9, 100 * share) : 100;
+  return `${fixed(shown, shown === 100 ? 0 : 1)}\u2009%`;
+}
+
+export const wholeNumber = (value) =>
+  Number.isFinite(value) ? Math.round(value).toLocaleString("en") : "\u2013";
+
 /** A time in seconds as m:ss.t. */
 export function clock(seconds) {
   if (!Number.isFinite(seconds)) return "\u2013";

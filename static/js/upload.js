@@ -49,7 +49,7 @@ function watchDrops(target) {
 /** Uploads a file, then opens it. */
 async function upload(file, overwrite = false) {
   if (!file) return;
-  showPanel("recordings");
+  showPanel("sources");
   const row = progressRow(file);
   try {
     await row.sent(overwrite);

@@ -6,7 +6,7 @@ import pytest
 from browsing import Visitor, wait_until
 from playwright.sync_api import expect
 
-PANELS = ("Corners", "Setup", "Plots", "Recordings", "Rejected")
+PANELS = ("Corners", "Setup", "Plots", "Source", "Rejected")
 CONTROLS = {
     "button", "checkbox", "combobox", "link", "radio", "slider", "spinbutton", "switch", "tab", "Iframe",
 }  # fmt: skip
@@ -89,6 +89,7 @@ def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], t
     wait_until(lambda: visitor.server.get("settings")["view"]["theme"] == theme, "the preference is taken")
     expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)
     visitor.server.patch("settings", {"view": {"compare": True}})
+    visitor.server.patch("source", {"state": "paused"})  # the corner that is selected stays
     visitor.page.keyboard.press("ArrowDown")
     for panel in PANELS[1:]:
         visitor.page.get_by_role("tab", name=panel).click()

@@ -30,13 +30,20 @@ def extraction(server: Server) -> dict:
         ("r", lambda server: view(server)["rotate"]),
         ("t", lambda server: view(server)["theme"] == "light"),
         ("l", lambda server: not server.get("source")["loop"]),
-        ("ArrowDown", lambda server: server.get("selection")["corner"] is not None),
+        ("w", lambda server: server.get("recorder")["state"] == "recording"),
     ],
 )
 def test_key_does_what_the_help_says(keys: Visitor, key: str, holds: Callable[[Server], bool]) -> None:
     assert not holds(keys.server)
     keys.page.keyboard.press(key)
     wait_until(lambda: holds(keys.server), f"{key} has worked")
+
+
+def test_arrow_selects_a_corner(keys: Visitor) -> None:
+    keys.page.keyboard.press(" ")
+    expect(keys.page.get_by_role("button", name="Back to live")).to_be_visible()
+    keys.page.keyboard.press("ArrowDown")
+    wait_until(lambda: keys.server.get("selection")["corner"], "a corner is selected")
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,8 @@ from playwright.sync_api import expect
 
 
 def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
-    expect(visitor.page).to_have_title("Simulated room · lidarcore")
-    expect(visitor.page.locator("#connection")).to_have_text("Live")
+    expect(visitor.page).to_have_title("Emulated S1 · lidarcore")
+    expect(visitor.page.locator("#connection")).to_have_text("Connected")
     expect(visitor.page.locator("#banner")).to_be_hidden()
     paths = [url.removeprefix(visitor.server.url) for url in visitor.asked]
     assert {"/static/js/main.js", "/viser/", "/api/v1/methods"} <= set(paths)

@@ -24,7 +24,7 @@ DROP = """([name, text]) => {
 
 
 def upload(visitor: Visitor, path: Path) -> None:
-    visitor.page.get_by_role("tab", name="Recordings").click()
+    visitor.page.get_by_role("tab", name="Source").click()
     visitor.page.get_by_label("Recording to upload").set_input_files(path)
     expect(visitor.page.locator("#readout-source")).to_have_text(path.name)
 
@@ -42,7 +42,7 @@ def test_upload_is_stored_and_plays(golf: Visitor) -> None:
     wait_until(lambda: server.get("source")["index"] > 3, "it plays")
     wait_until(lambda: drawn(golf.picture()).mean() > 0.01, "its room is drawn")
     wait_until(lambda: page.locator("#corner-table tbody tr").count() > 0, "corners are listed")
-    expect(page.locator("#library [aria-current=true]")).to_contain_text(GOLF.name)
+    expect(page.locator("#library-list [aria-current=true]")).to_contain_text(GOLF.name)
     assert page.locator("#uploads li").count() == 0, "the progress bar is gone"
 
 
@@ -50,7 +50,7 @@ def test_upload_shows_its_progress(visitor: Visitor) -> None:
     page = visitor.page
     slow = {"offline": False, "latency": 0, "downloadThroughput": -1, "uploadThroughput": 500_000}
     page.context.new_cdp_session(page).send("Network.emulateNetworkConditions", slow)
-    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("tab", name="Source").click()
     page.get_by_label("Recording to upload").set_input_files(HOKUYO)
     bar = page.get_by_role("progressbar", name=f"Uploading {HOKUYO.name}")
     wait_until(lambda: 0 < bar.evaluate("bar => bar.value") < 1, "a part is shown as sent")
@@ -95,7 +95,7 @@ def test_transport_pauses_steps_seeks_and_plays_on(golf: Visitor) -> None:
     page.get_by_label("Position in the recording").fill("600")
     wait_until(lambda: server.get("frame")["source"]["index"] == 600, "it has jumped")
     expect(page.locator("#position")).to_have_text(f"601\u2009/\u2009{count}")
-    page.get_by_label("Speed").select_option("5")
+    page.get_by_label("Speed", exact=True).select_option("5")
     page.get_by_role("button", name="Play", exact=True).click()
     wait_until(lambda: server.get("frame")["source"]["index"] > 610, "it plays on")
     assert server.get("source")["speed"] == 5
@@ -115,8 +115,8 @@ def test_end_is_reached_without_loop_and_play_begins_again(golf: Visitor) -> Non
 
 def test_recording_can_be_left_and_deleted(golf: Visitor) -> None:
     server, page = golf.server, golf.page
-    page.get_by_role("button", name="Simulated room").click()
-    expect(page.locator("#readout-source")).to_have_text("Simulated room")
+    page.get_by_role("button", name="Emulator").click()
+    expect(page.locator("#readout-source")).to_have_text("Emulated S1")
     page.get_by_role("button", name=f"Delete {GOLF.name}").click()
     page.get_by_role("button", name="Delete", exact=True).click()
     expect(page.get_by_role("button", name=f"Delete {GOLF.name}")).to_have_count(0)
@@ -126,7 +126,7 @@ def test_recording_can_be_left_and_deleted(golf: Visitor) -> None:
 def test_one_of_several_lidars_is_chosen(visitor: Visitor, tmp_path: Path) -> None:
     visitor.tolerated.append("409")
     page, path = visitor.page, write_two_lidars(tmp_path / "two_lidars.bag")
-    page.get_by_role("tab", name="Recordings").click()
+    page.get_by_role("tab", name="Source").click()
     page.get_by_label("Recording to upload").set_input_files(path)
     page.get_by_role("radio", name="/rear").check()
     page.get_by_role("button", name="Play this topic").click()

@@ -26,7 +26,7 @@ def test_link_restores_the_view_in_a_fresh_browser(server: Server, visit: Callab
 
     server.show(GOLF, 5)
     server.patch("settings", {"extraction": None, "view": None})
-    server.api.put("source", json={"kind": "simulation"}).raise_for_status()
+    server.api.put("source", json={"kind": "emulator"}).raise_for_status()
     second = visit().open(link)
     wait_until(lambda: server.get("frame")["source"]["index"] == 123, "the scan of the link is shown")
     wait_until(lambda: server.get("settings") == wanted, "the settings of the link are restored")
@@ -43,7 +43,7 @@ def test_link_to_a_recording_that_is_gone_says_so(server: Server, visit: Callabl
     visitor.tolerated.append("404")
     visitor.open("#recording=gone.bag&index=3")
     expect(visitor.page.locator(".toast.error")).to_contain_text("gone.bag")
-    assert server.get("source")["kind"] == "simulation"
+    assert server.get("source")["kind"] == "emulator"
 
 
 def test_plain_address_leaves_what_others_set_up(server: Server, visit: Callable[..., Visitor]) -> None:
@@ -72,7 +72,7 @@ def test_second_browser_sees_the_same(server: Server, visit: Callable[..., Visit
     expect(second.page.get_by_label("Fitter")).to_have_value("wctls")
     expect(second.page.get_by_role("switch", name="Compare methods")).to_be_checked()
     expect(second.page.get_by_role("checkbox", name="Grid")).not_to_be_checked()
-    expect(second.page.get_by_role("button", name="Play", exact=True)).to_be_visible()
+    expect(second.page.get_by_role("button", name="Back to live")).to_be_visible()
     wait_until(lambda: first.readout("frame") == second.readout("frame"), "both show the same frame")
     table = "#corner-table tbody"
     assert first.page.inner_text(table) == second.page.inner_text(table)
@@ -95,9 +95,9 @@ def test_lost_connection_comes_back_by_itself(own_server: Server, visit: Callabl
     visitor.open()
     own_server.kill()
     expect(visitor.page.locator("#banner")).to_contain_text("Connection lost")
-    expect(visitor.page.locator("#connection")).to_have_text("Reconnecting")
+    expect(visitor.page.locator("#connection")).to_have_text("Connection lost")
     own_server.start()
-    expect(visitor.page.locator("#connection")).to_have_text("Live")
+    expect(visitor.page.locator("#connection")).to_have_text("Connected")
     expect(visitor.page.locator("#banner")).to_be_hidden()
     shown, picture = int(visitor.readout("frame")), visitor.picture()
     wait_until(lambda: int(visitor.readout("frame")) > shown + 3, "frames advance again")

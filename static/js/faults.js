@@ -1,0 +1,30 @@
+// Faults to try on the emulator: how the page and the driver bear them is worth seeing before it matters.
+
+import { request } from "./api.js";
+import { $, el } from "./dom.js";
+import { attempt } from "./session.js";
+import { on } from "./store.js";
+
+const FAULTS = [
+  { label: "Unplug", commands: ["unplug"] },
+  { label: "Plug in again", commands: ["replug"] },
+  { label: "Stall for 2 s", commands: ["stall 2"] },
+  { label: "Flip bits in 2 %", commands: ["flip 0.02"] },
+  { label: "Lose 5 %", commands: ["lose 0.05"] },
+  { label: "No more faults", commands: ["flip 0", "lose 0"] },
+];
+
+export function mountFaults() {
+  const buttons = FAULTS.map(({ label, commands }) =>
+    el("button", { type: "button", onclick: () => attempt(() => sendAll(commands)) }, label),
+  );
+  $("faults").append(
+    el("p", { class: "muted" }, "Done to the emulated lidar; shares are of its data packets."),
+    el("div", { class: "fault-buttons" }, ...buttons),
+  );
+  on(["source"], ({ kind }) => ($("faults").hidden = kind !== "emulator"));
+}
+
+async function sendAll(commands) {
+  for (const command of commands) await request("POST", "emulator", { command });
+}

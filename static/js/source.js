@@ -1,0 +1,83 @@
+// What plays: the switch between device, emulator and recording, and what is known of the source.
+
+import { $, el, remake, setText } from "./dom.js";
+import { KINDS, nameOf, stateOf, stateText } from "./live.js";
+import { refreshRecordings } from "./recordings.js";
+import { open } from "./session.js";
+import { get, on } from "./store.js";
+import { toast } from "./toasts.js";
+
+const OPENING = {
+  device: ({ port }) => `Connecting to ${port ?? "the device"}`,
+  emulator: () => "Starting the emulator",
+  recording: ({ name }) => `Opening ${name}`,
+};
+
+let lastRecording = null;
+let told = null;
+
+export function mountSource() {
+  $("kinds").append(...Object.keys(KINDS).map(kindButton));
+  on(["source", "opening"], drawSwitch);
+  on(["source"], drawFacts);
+  on(["source"], ({ recording }) => (lastRecording = recording ?? lastRecording));
+  on(["source"], tell);
+}
+
+function kindButton(kind) {
+  return el("button", { type: "button", "data-kind": kind, onclick: () => choose(kind) }, KINDS[kind]);
+}
+
+/** Opens the only device, an emulator, or the recording that played last. */
+async function choose(kind) {
+  if (kind === get("source").kind) return;
+  if (kind !== "recording") await open({ kind });
+  else await openRecording();
+}
+
+async function openRecording() {
+  await refreshRecordings();
+  const names = get("recordings")?.recordings.map(({ name }) => name) ?? [];
+  const name = names.includes(lastRecording) ? lastRecording : names[0];
+  if (name) await open({ kind: "recording", name });
+  else toast("Record something, or upload a file.", { title: "There is no recording yet" });
+}
+
+function drawSwitch(source, opening) {
+  for (const button of $("kinds").children) {
+    const { kind } = button.dataset;
+    button.setAttribute("aria-pressed", String(kind === source.kind));
+    button.setAttribute("aria-busy", String(kind === opening?.kind));
+  }
+  $("source-state").dataset.state = opening ? "connecting" : stateOf(source);
+  setText($("source-state"), opening ? OPENING[opening.kind](opening) : stateText(source));
+}
+
+function drawFacts(source) {
+  const { recording, format, topic, topics, notes } = source;
+  const error = source.device?.error ?? source.error;
+  const shown = [nameOf(source), recording, format, topic, topics, notes, error];
+  remake($("source-facts"), shown, () => [
+    el("p", {}, [nameOf(source), format, topic].filter(Boolean).join(" · ")),
+    ...(error ? [el("p", { class: "fault", role: "alert" }, error)] : []),
+    ...(notes.length ? [el("ul", { class: "notes" }, ...notes.map((note) => el("li", {}, note)))] : []),
+    ...topicRows(source),
+  ]);
+}
+
+function topicRows({ recording, topic, topics }) {
+  if (!(topics?.length > 1)) return [];
+  const list = el(
+    "select",
+    { id: "topic", "data-key": "topic" },
+    ...topics.map((name) => el("option", { value: name, selected: name === topic }, name)),
+  );
+  list.addEventListener("change", () => open({ kind: "recording", name: recording, topic: list.value }));
+  return [el("div", { class: "row" }, el("label", { for: "topic" }, "Lidar topic"), list)];
+}
+
+/** What goes wrong while a recording plays is told once, wherever the user looks. */
+function tell({ error }) {
+  if (error && error !== told) toast(error, { title: "The recording cannot be read on", kind: "error" });
+  told = error;
+}
