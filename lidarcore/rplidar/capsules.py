@@ -38,8 +38,9 @@ class CapsuleSequence:
     The samples of a capsule lie between it and the next one. The step from one to the next (1/256 degree) is learnt
     from two that agree, and followed. What is twice, three times ... as far apart has lost what was between, and the
     first keeps its share. What is no multiple apart does not fit. What is closer, with nothing wrong between, cannot
-    come from a loss: the step was wrong, and with it the turn so far. In garbage, one of 65,536 places looks like a
-    capsule: one alone in it is not believed.
+    come from a loss: the step was wrong, and with it the turn so far. A checksum of 8 bits
+    lets one of 256 pass: a capsule alone in garbage is not believed, nor one after which bytes are missing, which may
+    be the halves of two.
     """
 
     def __init__(self, answer: Answer, clock: SampleClock, counts: Counts) -> None:
@@ -69,13 +70,12 @@ class CapsuleSequence:
         if word & RESTARTED and not skipped:
             self.restart()
         elif skipped > (MOST_LOST + 1) * self._format.size:
-            self._release(arrival)
-            self._turns.cut(arrival)
+            self._cut(arrival)
             self._clock.reset()
-            self._previous = None
-        elif skipped and self._previous and self._previous.after_garbage:
+            self._previous = self._doubtful = None
+        elif skipped and self._previous and (self._previous.after_garbage or skipped % self._format.size):
             self._counts.drop("unfit_packets")
-            self._previous = None
+            self._previous = self._doubtful = None
         capsule = Capsule(start, self._number + 1 + skipped // self._format.size, data, arrival, skipped > 0)
         if self._previous:
             capsule = self._follow(self._previous, capsule, behind // self._format.size)
@@ -113,43 +113,54 @@ class CapsuleSequence:
         sweep = Sweep(previous.start, width, previous.number, previous.data, None if lost else capsule.data)
         gap, self._next = sweep.number - self._next, sweep.number + 1
         if gap * self._step > TURN_Q8 // 2:
-            self._release(capsule.arrival)
-            self._turns.cut(capsule.arrival)
+            self._cut(capsule.arrival)
         unsure = lost > 0 or capsule.arrival - previous.arrival > LATE
         late = self._clock.late(self._samples(capsule.number + behind), capsule.arrival) > LATE
-        if (
-            late and (gap or unsure) and self._held
-        ):  # a second time: only the clock could tell before from after
-            self._condemn(capsule)
-            self._turns.cut(capsule.arrival)
-            self._held, self._unsure = [sweep], unsure
-            self._condemn(capsule)
-        elif late and (gap or unsure):
-            self._held, self._unsure, self._held_since = [sweep], unsure, capsule.arrival
+        if late and (gap or unsure):
+            self._suspect(sweep, unsure, capsule)
         elif self._held:
-            self._held.append(sweep)
-            if not late:
-                self._release(capsule.arrival)
-            elif capsule.arrival - self._held_since > BACKLOG or len(self._held) > MOST_HELD:
-                self._condemn(capsule)
+            self._hold(sweep, late, capsule)
         else:
             self._turns.add(sweep, capsule.arrival)
 
+    def _suspect(self, sweep: Sweep, unsure: bool, capsule: Capsule) -> None:
+        """Hold a sweep before which turns may be missing, or within which, if `unsure`."""
+        again = len(self._held) > 0
+        if again:
+            self._condemn(capsule)
+            self._turns.cut(capsule.arrival)
+        self._held, self._unsure, self._held_since = [sweep], unsure, capsule.arrival
+        if again:  # without the clock, nothing will ever tell
+            self._condemn(capsule)
+
+    def _hold(self, sweep: Sweep, late: bool, capsule: Capsule) -> None:
+        """Hold another sweep, until the reader has caught up or should have."""
+        self._held.append(sweep)
+        if not late:
+            self._release(capsule.arrival)
+        elif capsule.arrival - self._held_since > BACKLOG or len(self._held) > MOST_HELD:
+            self._condemn(capsule)
+
     def _release(self, arrival: float) -> None:
-        """What is held is what its angles say."""
+        """What is held is where its angles say."""
         for sweep in self._held:
             self._turns.add(sweep, arrival)
         self._held = []
 
     def _condemn(self, capsule: Capsule) -> None:
-        """What is held belongs to a later turn, but a sweep within which there was a pause to none."""
-        self._counts.drop("unfit_packets", self._unsure)
+        """What is held is of a later turn, but for a sweep within which turns are missing: that has no end."""
         self._turns.cut(capsule.arrival)
         self._clock.reset()
         self._clock.arrived(self._samples(capsule.number), capsule.arrival)
         if self._unsure:
+            self._counts.drop("unfit_packets")
             del self._held[0]
         self._release(capsule.arrival)
+
+    def _cut(self, arrival: float) -> None:
+        """Turns may be missing after what has come so far."""
+        self._release(arrival)
+        self._turns.cut(arrival)
 
     def _learn(self, doubtful: Sweep, sweep: Sweep, arrival: float) -> None:
         """Two steps that agree with each other, and not with the one believed."""

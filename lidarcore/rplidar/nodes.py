@@ -66,12 +66,8 @@ class NodeSequence:
     """
 
     def __init__(self, answer: Answer, clock: SampleClock, counts: Counts) -> None:
-        self._format, self._decode, self._clock, self._counts = (
-            FORMATS[answer],
-            DECODERS[answer],
-            clock,
-            counts,
-        )
+        self._format, self._decode = FORMATS[answer], DECODERS[answer]
+        self._clock, self._counts = clock, counts
         self.completed: list[Revolution] = []
         self._count = 0
         self._nodes = _NONE  # of the present turn; the newest `_waiting` of them may leap
@@ -80,8 +76,12 @@ class NodeSequence:
 
     def restart(self) -> None:
         """The stream begins anew, anywhere."""
-        self._counts.drop("partial_samples", self._nodes.shape[1])
         self._clock.reset()
+        self._forget()
+
+    def _forget(self) -> None:
+        """Leave out what is there, and what comes before the next start."""
+        self._counts.drop("partial_samples", self._nodes.shape[1])
         self._nodes, self._waiting, self._begun, self._at_front = _NONE, 0, False, False
 
     def add(self, skipped: int, data: bytes, arrival: float, behind: int) -> None:
@@ -95,13 +95,13 @@ class NodeSequence:
         newest = self._count + behind // self._format.size * self._format.samples
         if lost > MOST_LOST or (self._leaps_to(nodes) and self._clock.late(newest, arrival) > LATE):
             self._cut(arrival)
-        self._clock.arrived(self._count, arrival)
+        self._clock.arrived(newest, arrival)
         for start in range(0, nodes.shape[1], CHUNK):
             self._collect(nodes[:, start : start + CHUNK], arrival)
 
     def _leaps_to(self, nodes: Nodes) -> bool:
         """Something is missing before these nodes."""
-        return self._nodes.shape[1] > 0 and abs(_signed(nodes[ANGLE, 0] - self._nodes[ANGLE, -1])) > GAP
+        return bool((np.abs(_signed(nodes[ANGLE, :1] - self._nodes[ANGLE, -1:])) > GAP).any())
 
     def _cut(self, arrival: float) -> None:
         """Nobody knows how much was lost before the next node: it may be in any later turn."""
@@ -117,17 +117,15 @@ class NodeSequence:
             self._finish(end, arrival)
             self._begun = self._at_front = True
         if self._nodes.shape[1] > MOST_NODES:
-            self.restart()
+            self._forget()
 
     def _leave_out_leaps(self) -> None:
         """Nodes far from both neighbours, while those are close to each other."""
         first = max(self._nodes.shape[1] - self._waiting - 1, 0)
         angles = self._nodes[ANGLE, first:]
-        steps, across = (
-            np.abs(_signed(np.diff(angles))) > LEAP,
-            np.abs(_signed(angles[2:] - angles[:-2])) <= LEAP,
-        )
-        leaps = np.flatnonzero(steps[:-1] & steps[1:] & across) + first + 1
+        leaping = np.abs(_signed(np.diff(angles))) > LEAP
+        across = np.abs(_signed(angles[2:] - angles[:-2])) <= LEAP
+        leaps = np.flatnonzero(leaping[:-1] & leaping[1:] & across) + first + 1
         self._waiting = 1
         if len(leaps):
             self._counts.drop("unfit_packets", len(leaps))
@@ -174,7 +172,7 @@ def _signed(angles: Ints) -> Ints:
 
 def _gaps(turned: Ints, after_loss: NDArray[np.bool_]) -> Ints:
     """(G, 2) 1/65536 degree: where bytes were lost, or neighbours, or the turn's ends, are far apart."""
-    edges = np.clip(np.concatenate([[0], turned, [TURN]]), 0, TURN)
+    edges = np.concatenate([[0], np.maximum.accumulate(turned), [TURN]]).clip(0, TURN)
     widths = np.diff(edges)
     lost = (widths > GAP) | (np.append(after_loss, False) & (widths > 0))
     return np.stack([edges[:-1][lost], edges[1:][lost]], -1)

@@ -19,9 +19,9 @@ class Format:
 
     size     bytes of a packet
     samples  measurements in it
-    pattern  what may be packets, where the one before was in its place
+    pattern  its group 1 is what may be packets, where the one before was in its place
     seen     bytes that `pattern` looks at
-    search   what may be packets, anywhere
+    search   its group 1 is what may be packets, anywhere
     sought   bytes that `search` looks at
     intact   whether the bytes matched are packets
     """
@@ -40,11 +40,13 @@ class PacketFinder:
 
     def __init__(self, layout: Format, counts: Counts) -> None:
         self._format, self._counts = layout, counts
-        self._buffer, self._skipped, self._in_step = b"", 0, False
+        self._buffer = b""
+        self.reset()
 
     def reset(self) -> None:
-        """Forget what is incomplete."""
-        self._buffer, self._skipped, self._in_step = b"", 0, False
+        """Forget what is incomplete; a stream begins with a packet."""
+        self._counts.drop("garbage_bytes", len(self._buffer))
+        self._buffer, self._skipped, self._in_step = b"", 0, True
 
     @property
     def waiting(self) -> int:
@@ -60,10 +62,10 @@ class PacketFinder:
                 match = layout.pattern.match(buffer, at)
             else:
                 match = layout.search.search(buffer, at)
-                at = self._skip(at, match.start() if match else len(buffer) - layout.sought + 1)
-            if match and layout.intact(match[0]):
-                runs.append((self._skipped, match[0]))
-                self._skipped, self._in_step, at = 0, True, match.end()
+                at = self._skip(at, match.start(1) if match else len(buffer) - layout.sought + 1)
+            if match and layout.intact(match[1]):
+                runs.append((self._skipped, match[1]))
+                self._skipped, self._in_step, at = 0, True, match.end(1)
             elif self._in_step:
                 self._in_step = False
                 self._counts.drop("damaged_packets")
@@ -79,7 +81,7 @@ class PacketFinder:
 
 
 def _capsule(size: int, samples: int) -> Format:
-    pattern = re.compile(rb"[\xa0-\xaf][\x50-\x5f](?s:.{%d})" % (size - 2))
+    pattern = re.compile(rb"([\xa0-\xaf][\x50-\x5f](?s:.{%d}))" % (size - 2))
     return Format(size, samples, pattern, size, pattern, size, _xor_is_right)
 
 
@@ -88,7 +90,7 @@ def _xor_is_right(capsule: bytes) -> bool:
 
 
 def _hq(size: int, samples: int) -> Format:
-    pattern = re.compile(rb"\xa5(?s:.{%d})" % (size - 1))
+    pattern = re.compile(rb"(\xa5(?s:.{%d}))" % (size - 1))
     return Format(size, samples, pattern, size, pattern, size, _crc_is_right)
 
 
@@ -98,21 +100,20 @@ def _crc_is_right(packet: bytes) -> bool:
     return zlib.crc32(data) == int.from_bytes(packet[-4:], "little")
 
 
-def _nodes(in_step: int, anywhere: int) -> Format:
-    """A node has no checksum, and one in four random ones passes: each is believed with so many in a row behind it."""
-    flags = b"".join(
-        re.escape(bytes((byte,))) for byte in range(256) if byte & 3 in (1, 2)
-    )  # S and its complement
+def _nodes(beside: int, anywhere: int) -> Format:
+    """A node has no checksum, and one in four random ones passes: believed with so many beside it that pass too."""
+    # The lowest bits of a node are S and its complement, and in the second byte a check bit that is set.
+    flags = b"".join(re.escape(bytes((byte,))) for byte in range(256) if byte & 3 in (1, 2))
     check = b"".join(re.escape(bytes((byte,))) for byte in range(1, 256, 2))
     node = rb"(?:[%b][%b](?s:.{3}))" % (flags, check)
-    behind = rb"(?=%b{%d})" % (node, in_step)
-    pattern = re.compile(node + b"+" + behind)
-    search = re.compile(node + b"{%d,}" % (anywhere - in_step) + behind)
-    return Format(5, 1, pattern, 5 * (in_step + 1), search, 5 * anywhere, lambda run: True)
+    before, behind = rb"%b{%d}" % (node, beside), rb"(?=%b{%d})" % (node, beside)
+    pattern = re.compile(b"(" + node + b"+)" + behind)
+    search = re.compile(before + b"(" + node + b"{%d,})" % (anywhere - 2 * beside) + behind)
+    return Format(5, 1, pattern, 5 * (beside + 1), search, 5 * anywhere, lambda run: True)
 
 
 FORMATS = {
-    Answer.NODES: _nodes(in_step=6, anywhere=16),
+    Answer.NODES: _nodes(beside=4, anywhere=16),
     Answer.EXPRESS: _capsule(84, 32),
     Answer.HQ: _hq(781, 96),
     Answer.ULTRA: _capsule(132, 96),

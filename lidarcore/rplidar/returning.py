@@ -22,14 +22,15 @@ def find_again(
 ) -> Session:
     """Try until it is back: whatever sensor is at the same path, or the same one at another path.
 
-    Every failure is told to `complain`. Raises Cancelled once the driver is closed.
+    What hinders it at a port that is there is told to `complain`. Raises Cancelled once the driver is closed.
     """
     pause, before, strangers = FIRST_PAUSE, DeviceError, set[str]()
     while not lost.port.cancelled.wait(pause):
         try:
             return _find(lost, connect, list_ports, strangers)
         except DeviceError as error:
-            complain(error)
+            if not isinstance(error, NoDeviceError):  # that it went away has been said
+                complain(error)
             longest = LONGEST_PAUSE_ABSENT if isinstance(error, NoDeviceError) else LONGEST_PAUSE
             # Something else than before is the matter: it may be just coming up.
             pause = min(2 * pause, longest) if type(error) is before else FIRST_PAUSE

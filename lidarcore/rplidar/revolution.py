@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from lidarcore.scan import Array, Ints, Scan
 
 TURN = 360 << 16  # 1/65536 degree
-RADIAN = 2 * np.pi / TURN  # of 1/65536 degree
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,14 +50,14 @@ class Revolution:
         """
         return Scan(
             self.distances[::-1] / 4000,
-            _wrapped(-RADIAN * self.angles[::-1]),
+            _counter_clockwise(self.angles[::-1]),
             stamp=float(self.times[0] + stamp_offset),
-            quality=None if self.quality is None else self.quality[::-1],
+            quality=None if self.quality is None else self.quality[::-1].astype(np.float64),
             beam_times=self.times[::-1] - self.times[0],
-            gaps=_wrapped(-RADIAN * self.gaps[:, ::-1]),
+            gaps=_counter_clockwise(self.gaps[:, ::-1]),
         )
 
 
-def _wrapped(angles: Array) -> Array:
-    """Angles from -2 pi to 0 rad, turned to within -pi to pi."""
-    return np.where(angles <= -np.pi, angles + 2 * np.pi, angles)
+def _counter_clockwise(angles: Ints) -> Array:
+    """Radians counter-clockwise, above -pi up to pi, from 1/65536 degree clockwise."""
+    return np.where(angles < TURN // 2, -angles, TURN - angles) * (2 * np.pi / TURN)

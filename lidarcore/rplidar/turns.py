@@ -88,8 +88,17 @@ class Turns:
             )
             numbers = np.array([sweep.number for sweep in sweeps])
             times = self._clock.times(numbers[:, None] * self._samples + order)
-            columns = (column.ravel()[first:last] for column in ((angles - lags) % TURN, distances, times))
-            self.completed.append(Revolution(*columns, None, _gaps(starts, widths), arrival))
+            inside, gaps = slice(first, last), _gaps(starts, widths)
+            self.completed.append(
+                Revolution(
+                    ((angles - lags) % TURN).ravel()[inside],
+                    distances.ravel()[inside],
+                    times.ravel()[inside],
+                    None,
+                    gaps,
+                    arrival,
+                )
+            )
 
 
 def _gaps(starts: Ints, widths: Ints) -> Ints:

@@ -20,10 +20,9 @@ def wavering(t):
 
 
 def assert_no_turns_are_merged(revolutions, source: cs.Stream) -> None:
+    """Start angles are whole 1/64 degrees, so that a sample beside the front may be counted to the other side."""
     for revolution in revolutions:
-        angles = source.angles[cs.numbers(revolution)]
-        assert np.ptp(np.floor((angles + 0.02) / 360)) == 0 or np.ptp(angles) < 360
-        assert np.ptp(angles) < 360
+        assert np.ptp(source.angles[cs.numbers(revolution)]) < 360 + 1 / 32
 
 
 def assert_gaps_say_what_is_missing(revolutions, source: cs.Stream) -> None:
@@ -97,21 +96,19 @@ def flipped(data: bytes, dice: np.random.Generator) -> bytes:
     return bytes(damaged)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_lost_bytes_cost_only_the_capsules_they_were_in(seed: int) -> None:
+@pytest.mark.parametrize("seed", range(10))
+def test_lost_bytes_cost_the_capsules_they_were_in_and_those_before(seed: int) -> None:
+    """Two halves of capsules pass the checksum once in 256 times: no point may come of that."""
     dice = np.random.default_rng(seed)
     source = cs.stream(1600)
-    lossy = [
-        data[:at] + data[at + dice.integers(1, 6) :] if (at := dice.integers(0, 4000)) < 84 else data
-        for data in source.capsules
-    ]
-    hurt = sum(a != b for a, b in zip(lossy, source.capsules, strict=True))
+    lossy = [data[: dice.integers(0, 84)] if dice.random() < 0.05 else data for data in source.capsules]
+    hurt = sum(len(data) < 84 for data in lossy)
     revolutions = cs.decoded(decoder(), source, lossy)
     which = np.concatenate([cs.numbers(r) for r in revolutions])
     assert np.concatenate([cs.errors_mm(r.angles, cs.numbers(r), source) for r in revolutions]).max() < 60
     assert_no_turns_are_merged(revolutions, source)
-    assert hurt > 20
-    assert len(which) > 40 * (1600 - 27 - 24 - 2.2 * hurt)
+    assert hurt > 50
+    assert len(which) > 40 * (1600 - 27 - 24 - 3.2 * hurt)
 
 
 @given(st.integers(0, 30_000), st.integers(60, 110), st.integers(0, 2**32 - 1), st.booleans())
