@@ -93,7 +93,7 @@ class Scan:
     @cached_property
     def completeness(self) -> float:
         """Share of the revolution that arrived, 0 to 1."""
-        return float(1 - ((self.gaps[:, 1] - self.gaps[:, 0]) % (2 * np.pi)).sum() / (2 * np.pi))
+        return max(0.0, float(1 - ((self.gaps[:, 1] - self.gaps[:, 0]) % (2 * np.pi)).sum() / (2 * np.pi)))
 
     @cached_property
     def xy(self) -> Array:

@@ -7,10 +7,10 @@ with Driver() as driver:
         ...
 """
 
-from lidarcore.rplidar.devices import FoundDevice, find_devices
+from lidarcore.rplidar.connection.devices import FoundDevice, find_devices
+from lidarcore.rplidar.connection.statistics import Statistics
 from lidarcore.rplidar.driver import Driver, State
 from lidarcore.rplidar.protocol import DeviceInfo, Health, Revolution, ScanMode
-from lidarcore.rplidar.statistics import Statistics
 
 __all__ = [
     "DeviceInfo",

@@ -13,14 +13,14 @@ from typing import Literal, Self
 from serial.tools.list_ports import comports
 
 from lidarcore.errors import DeviceError, NoAnswerError
-from lidarcore.rplidar.devices import find_other_baud, only_device
-from lidarcore.rplidar.latest import Latest
-from lidarcore.rplidar.leaving import close_on_leaving, leave_alone
-from lidarcore.rplidar.port import Cancelled, ListPorts, Tap
+from lidarcore.rplidar.connection.devices import find_other_baud, only_device
+from lidarcore.rplidar.connection.latest import Latest
+from lidarcore.rplidar.connection.leaving import close_on_leaving, leave_alone
+from lidarcore.rplidar.connection.port import Cancelled, ListPorts, Tap
+from lidarcore.rplidar.connection.returning import find_again
+from lidarcore.rplidar.connection.session import Session, Wishes
+from lidarcore.rplidar.connection.statistics import Statistics, Tally
 from lidarcore.rplidar.protocol import DeviceInfo, Health, Revolution, ScanMode
-from lidarcore.rplidar.returning import find_again
-from lidarcore.rplidar.session import Session, Wishes
-from lidarcore.rplidar.statistics import Statistics, Tally
 from lidarcore.scan import Scan
 
 State = Literal["connecting", "streaming", "stalled", "reconnecting", "closed"]

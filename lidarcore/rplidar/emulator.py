@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from lidarcore.errors import LidarError
-from lidarcore.rplidar.console import Console
-from lidarcore.rplidar.emulated_device import Device, EmulatedS1
-from lidarcore.rplidar.emulated_scan import furnished
-from lidarcore.rplidar.emulator_options import FIRST_LINE, EmulatorOptions, parse
-from lidarcore.rplidar.faults import Faults
+from lidarcore.rplidar.emulation.console import Console
+from lidarcore.rplidar.emulation.device import Device, EmulatedS1
+from lidarcore.rplidar.emulation.faults import Faults
+from lidarcore.rplidar.emulation.options import FIRST_LINE, EmulatorOptions, parse
+from lidarcore.rplidar.emulation.pseudo_terminal import PseudoTerminal
+from lidarcore.rplidar.emulation.replay import Replay, ReplayedS1
+from lidarcore.rplidar.emulation.scan import furnished
 from lidarcore.rplidar.protocol import Health
-from lidarcore.rplidar.pseudo_terminal import PseudoTerminal
-from lidarcore.rplidar.replayed_device import Replay, ReplayedS1
 
 _MOST_GARBAGE = 1 << 16  # bytes
 _LONGEST_WAIT = 60.0  # s

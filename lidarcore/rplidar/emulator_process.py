@@ -8,7 +8,7 @@ from contextlib import suppress
 from typing import Any, Self
 
 from lidarcore.errors import DeviceError
-from lidarcore.rplidar.emulator_options import FIRST_LINE, EmulatorOptions
+from lidarcore.rplidar.emulation.options import FIRST_LINE, EmulatorOptions
 
 _MODULE = "lidarcore.rplidar.emulator"
 _START_TIME = 60.0  # s; under one, unless kernels have to be compiled

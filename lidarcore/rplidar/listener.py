@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 
-from lidarcore.rplidar.packets import FORMATS
+from lidarcore.rplidar.decoding.packets import FORMATS
 from lidarcore.rplidar.protocol import (
     S1_MODES,
     Answer,

@@ -6,10 +6,10 @@ packets in it, `capsules` and `turns`, or `nodes`, put what they hold into revol
 
 from lidarcore.rplidar.answers import S1_MODES, Answer, Descriptor, DeviceInfo, Health, ScanMode
 from lidarcore.rplidar.commands import Command, Conf, Request, RequestReader, request
-from lidarcore.rplidar.counts import Counts
-from lidarcore.rplidar.decoder import StreamDecoder
+from lidarcore.rplidar.decoding.counts import Counts
+from lidarcore.rplidar.decoding.decoder import StreamDecoder
+from lidarcore.rplidar.decoding.revolution import Revolution
 from lidarcore.rplidar.encoding import encode_dense, encode_nodes
-from lidarcore.rplidar.revolution import Revolution
 
 __all__ = [
     "S1_MODES",

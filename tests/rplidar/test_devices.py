@@ -20,7 +20,7 @@ from typer.testing import CliRunner
 from app.cli_devices import ADVICE, devices, sensor_at
 from lidarcore.errors import NoDeviceError
 from lidarcore.rplidar import Driver, find_devices
-from lidarcore.rplidar.devices import only_device
+from lidarcore.rplidar.connection.devices import only_device
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
 CP2102 = (0x10C4, 0xEA60)

@@ -10,8 +10,8 @@ import serial
 from emulated_line import ASK_HEALTH, ASK_INFO, LEGACY, SCAN, capsules, line_to, nodes, steps
 
 from lidarcore import DeviceError
+from lidarcore.rplidar.emulation.faults import Faults
 from lidarcore.rplidar.emulator_process import EmulatorProcess
-from lidarcore.rplidar.faults import Faults
 
 CAPSULE = 40 * 108e-6  # s
 STEP = 15.552  # degrees at 10 Hz

@@ -12,9 +12,9 @@ from emulated_line import ASK_INFO, line_to
 from pydantic import ValidationError
 
 from lidarcore import DeviceError
-from lidarcore.rplidar.emulator_options import EmulatorOptions, parse
+from lidarcore.rplidar.emulation.options import EmulatorOptions, parse
+from lidarcore.rplidar.emulation.pseudo_terminal import PseudoTerminal
 from lidarcore.rplidar.emulator_process import EmulatorProcess
-from lidarcore.rplidar.pseudo_terminal import PseudoTerminal
 
 EMULATOR = [sys.executable, "-m", "lidarcore.rplidar.emulator"]
 PARENT = """

@@ -21,9 +21,9 @@ from emulated_line import (
     with_checksum,
 )
 
-from lidarcore.rplidar.emulated_device import EmulatedS1
-from lidarcore.rplidar.emulated_scan import furnished
-from lidarcore.rplidar.emulator_options import EmulatorOptions
+from lidarcore.rplidar.emulation.device import EmulatedS1
+from lidarcore.rplidar.emulation.options import EmulatorOptions
+from lidarcore.rplidar.emulation.scan import furnished
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
 QUIET = 0.15  # s without a byte: an answer would have come in a few ms

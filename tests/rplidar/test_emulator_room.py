@@ -7,10 +7,10 @@ import pytest
 from emulated_line import ASK_INFO, DENSE, LEGACY, SCAN, line_to, nodes, steps
 
 from lidarcore.rplidar.capture import CaptureWriter, Stream
-from lidarcore.rplidar.emulated_device import EmulatedS1
-from lidarcore.rplidar.emulated_scan import furnished
+from lidarcore.rplidar.emulation.device import EmulatedS1
+from lidarcore.rplidar.emulation.options import EmulatorOptions
+from lidarcore.rplidar.emulation.scan import furnished
 from lidarcore.rplidar.emulator import main
-from lidarcore.rplidar.emulator_options import EmulatorOptions
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.simulation import furnished_room
 from lidarcore.simulation.paths import ROUND, standing, wandering
@@ -56,7 +56,7 @@ def test_a_sensor_that_moves_follows_its_path():
         line.scan()
         _, _, starts, distances = line.capsules(401)
     angles = starts[:-1, None] + steps(starts)[:, None] / 40 * np.arange(40)
-    candidates = np.arange(0, ROUND, 0.1)
+    candidates = np.arange(0, ROUND, 0.025)  # in which it moves by 7 mm
     found = []
     for k in (10, 200, 390):  # one capsule of each: when was it measured, by where it fits the room
         misfit = [np.abs(truth(angles[k], wandering, time) - distances[k]).mean() for time in candidates]

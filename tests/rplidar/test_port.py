@@ -12,12 +12,12 @@ import pytest
 from serial import Serial
 
 from lidarcore.errors import NoDeviceError, PortBusyError, UnpluggedError
-from lidarcore.rplidar.port import Cancelled, Port
+from lidarcore.rplidar.connection.port import Cancelled, Port
 
 OPEN_IT = """
 import grp, os, sys
 from lidarcore.errors import DeviceError
-from lidarcore.rplidar.port import Port
+from lidarcore.rplidar.connection.port import Port
 if os.getuid() == 0:
     os.setuid(65534)  # nobody: for root there are no permissions
 try:

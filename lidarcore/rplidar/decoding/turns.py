@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarcore.rplidar.clock import SampleClock
-from lidarcore.rplidar.contents import Decoder
-from lidarcore.rplidar.counts import Counts
-from lidarcore.rplidar.revolution import TURN, Revolution
+from lidarcore.rplidar.decoding.clock import SampleClock
+from lidarcore.rplidar.decoding.contents import Decoder
+from lidarcore.rplidar.decoding.counts import Counts
+from lidarcore.rplidar.decoding.revolution import TURN, Revolution
 from lidarcore.scan import Ints
 
 TURN_Q8 = 360 << 8  # 1/256 degree
@@ -71,7 +71,7 @@ class Turns:
 
     def restart(self) -> None:
         """Forget what is there, and leave out what comes before the front."""
-        self._counts.drop("partial_samples", len(self._sweeps) * self._samples)
+        self._counts.partial_samples += len(self._sweeps) * self._samples
         self._starts, self._sweeps, self._begun = [], [], False
 
     def _finish(self, arrival: float) -> None:
@@ -81,7 +81,7 @@ class Turns:
         angles = (starts << 8)[:, None] + ((widths << 8) // self._samples)[:, None] * order
         first, last = np.searchsorted(angles.ravel(), (0, TURN)).tolist()
         if not self._begun:
-            self._counts.drop("partial_samples", last - first)
+            self._counts.partial_samples += last - first
         elif first < last:
             distances, lags = self._decode(
                 [sweep.capsule for sweep in sweeps], [sweep.following for sweep in sweeps]

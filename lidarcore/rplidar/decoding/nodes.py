@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.rplidar.answers import Answer
-from lidarcore.rplidar.clock import SampleClock
-from lidarcore.rplidar.counts import Counts
-from lidarcore.rplidar.packets import FORMATS
-from lidarcore.rplidar.revolution import TURN, Revolution
+from lidarcore.rplidar.decoding.clock import SampleClock
+from lidarcore.rplidar.decoding.counts import Counts
+from lidarcore.rplidar.decoding.packets import FORMATS
+from lidarcore.rplidar.decoding.revolution import TURN, Revolution
 from lidarcore.scan import Ints
 
 DEGREE = 1 << 16
@@ -81,7 +81,7 @@ class NodeSequence:
 
     def _forget(self) -> None:
         """Leave out what is there, and what comes before the next start."""
-        self._counts.drop("partial_samples", self._nodes.shape[1])
+        self._counts.partial_samples += self._nodes.shape[1]
         self._nodes, self._waiting, self._begun, self._at_front = _NONE, 0, False, False
 
     def add(self, skipped: int, data: bytes, arrival: float, behind: int) -> None:
@@ -156,7 +156,7 @@ class NodeSequence:
         """The first nodes are a turn."""
         nodes, self._nodes = self._nodes[:, :end], self._nodes[:, end:]
         if not self._begun:
-            self._counts.drop("partial_samples", end)
+            self._counts.partial_samples += end
         elif end:
             angles, distances, quality, _, indices, after_loss = nodes
             gaps = _gaps(self._turned(angles), after_loss > 0)

@@ -6,8 +6,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from lidarcore.errors import DeviceError, NoAnswerError
-from lidarcore.rplidar import handshake
-from lidarcore.rplidar.port import Port, Tap
+from lidarcore.rplidar.connection import handshake
+from lidarcore.rplidar.connection.port import Port, Tap
 from lidarcore.rplidar.protocol import Revolution, StreamDecoder
 
 STALL = 0.5  # s without measurements after which the stream counts as stalled

@@ -8,9 +8,9 @@ import struct
 import time
 
 from lidarcore.errors import DeviceError, NoAnswerError, ProtectionStopError
-from lidarcore.rplidar.port import Port
+from lidarcore.rplidar.connection.port import Port
+from lidarcore.rplidar.connection.requests import STREAMS, ask, ask_conf, ask_number, begin
 from lidarcore.rplidar.protocol import S1_MODES, Answer, Command, Conf, DeviceInfo, Health, ScanMode, request
-from lidarcore.rplidar.requests import STREAMS, ask, ask_conf, ask_number, begin
 
 COMMON_BAUDS = (256000, 115200, 460800, 1000000)
 PATIENT = 5  # tries; fewer would fail on a sensor that is just starting

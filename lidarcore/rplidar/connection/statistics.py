@@ -1,11 +1,11 @@
 """How well the measurements arrive."""
 
 import time
-from collections import Counter, deque
+from collections import deque
 from dataclasses import dataclass, field
 
-from lidarcore.rplidar.counts import Counts
-from lidarcore.rplidar.revolution import TURN, Revolution
+from lidarcore.rplidar.decoding.counts import Counts
+from lidarcore.rplidar.decoding.revolution import TURN, Revolution
 
 RECENT = 10  # revolutions
 STALE = 1.0  # s; older ones say nothing about now
@@ -45,7 +45,7 @@ class Tally:
 
     def begin(self, counts: Counts) -> None:
         """There is a new connection, whose decoder counts there."""
-        self._past, self._now = _sum(self._past, self._now), counts
+        self._past, self._now = self._past + self._now, counts
         self._connections += 1
         self._recent.clear()
 
@@ -55,7 +55,7 @@ class Tally:
 
     def statistics(self, overruns: int) -> Statistics:
         """As of now."""
-        total, recent = _sum(self._past, self._now), list(self._recent)
+        total, recent = self._past + self._now, list(self._recent)
         rate, samples = _rates(recent)
         return Statistics(
             bytes=total.bytes,
@@ -68,16 +68,6 @@ class Tally:
             samples_per_s=samples,
             completeness=_completeness(recent[-RECENT:]),
         )
-
-
-def _sum(one: Counts, other: Counts) -> Counts:
-    return Counts(
-        one.bytes + other.bytes,
-        one.packets + other.packets,
-        one.samples + other.samples,
-        one.revolutions + other.revolutions,
-        Counter(one.dropped) + Counter(other.dropped),
-    )
 
 
 def _rates(recent: list[Revolution]) -> tuple[float, float]:

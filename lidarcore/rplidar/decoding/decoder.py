@@ -1,12 +1,12 @@
 """From the bytes of a scan to revolutions."""
 
 from lidarcore.rplidar.answers import Answer
-from lidarcore.rplidar.capsules import CapsuleSequence
-from lidarcore.rplidar.clock import SampleClock
-from lidarcore.rplidar.counts import Counts
-from lidarcore.rplidar.nodes import NodeSequence
-from lidarcore.rplidar.packets import FORMATS, PacketFinder
-from lidarcore.rplidar.revolution import Revolution
+from lidarcore.rplidar.decoding.capsules import CapsuleSequence
+from lidarcore.rplidar.decoding.clock import SampleClock
+from lidarcore.rplidar.decoding.counts import Counts
+from lidarcore.rplidar.decoding.nodes import NodeSequence
+from lidarcore.rplidar.decoding.packets import FORMATS, PacketFinder
+from lidarcore.rplidar.decoding.revolution import Revolution
 
 BITS_PER_BYTE = 10  # start and stop bit
 

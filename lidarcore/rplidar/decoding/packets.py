@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from lidarcore.rplidar.answers import Answer
 from lidarcore.rplidar.commands import xor
-from lidarcore.rplidar.counts import Counts
+from lidarcore.rplidar.decoding.counts import Counts
 
 Run = tuple[int, bytes]
 """How many bytes were passed over before, and the bytes of one or several packets."""

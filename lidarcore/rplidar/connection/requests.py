@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import TypeVar
 
-from lidarcore.rplidar.packets import FORMATS
-from lidarcore.rplidar.port import Port
+from lidarcore.rplidar.connection.port import Port
+from lidarcore.rplidar.decoding.packets import FORMATS
 from lidarcore.rplidar.protocol import Answer, Command, Conf, Descriptor, request
 
 ANSWER_TIME = 0.5  # s; a sensor takes a few ms, a busy computer longer to notice

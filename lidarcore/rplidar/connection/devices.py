@@ -8,8 +8,8 @@ from serial.tools.list_ports_common import ListPortInfo
 
 from lidarcore.errors import DeviceError, NoAnswerError, NoDeviceError, PortBusyError
 from lidarcore.rplidar.answers import DeviceInfo
-from lidarcore.rplidar.handshake import COMMON_BAUDS, find_baud, identify, stop
-from lidarcore.rplidar.port import ListPorts, Port, ports_there_are
+from lidarcore.rplidar.connection.handshake import COMMON_BAUDS, find_baud, identify, stop
+from lidarcore.rplidar.connection.port import ListPorts, Port, ports_there_are
 
 ADAPTERS = {(0x10C4, 0xEA60)}  # CP2102, on the USB adapter of every RPLIDAR
 

@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 from lidarcore.rplidar.answers import Answer
-from lidarcore.rplidar.clock import SampleClock
-from lidarcore.rplidar.contents import DECODERS
-from lidarcore.rplidar.counts import Counts
-from lidarcore.rplidar.packets import FORMATS
-from lidarcore.rplidar.turns import TURN_Q8, Sweep, Turns
+from lidarcore.rplidar.decoding.clock import SampleClock
+from lidarcore.rplidar.decoding.contents import DECODERS
+from lidarcore.rplidar.decoding.counts import Counts
+from lidarcore.rplidar.decoding.packets import FORMATS
+from lidarcore.rplidar.decoding.turns import TURN_Q8, Sweep, Turns
 
 RESTARTED = 1 << 15  # bit of the start angle: first capsule of a scan, or the sensor lost its angle
 TOLERANCE = 0.1

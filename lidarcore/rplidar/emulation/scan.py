@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.noise import SensorNoise
-from lidarcore.rplidar.emulator_options import EmulatorOptions
+from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.rplidar.protocol import Answer, ScanMode, encode_dense, encode_nodes
 from lidarcore.scan import Array
 from lidarcore.simulation.paths import ROUND, standing, wandering

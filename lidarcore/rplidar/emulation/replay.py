@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lidarcore.rplidar.capture import read_pieces, read_stream
-from lidarcore.rplidar.emulated_device import PACKET_SIZES, EmulatedS1
-from lidarcore.rplidar.emulated_scan import Packet, Room
-from lidarcore.rplidar.emulator_options import EmulatorOptions
+from lidarcore.rplidar.emulation.device import PACKET_SIZES, EmulatedS1
+from lidarcore.rplidar.emulation.options import EmulatorOptions
+from lidarcore.rplidar.emulation.scan import Packet, Room
 from lidarcore.rplidar.protocol import Command, Descriptor, Request, RequestReader, ScanMode
 
 _SCANS = (Command.SCAN, Command.FORCE_SCAN, Command.EXPRESS_SCAN)

@@ -4,8 +4,8 @@ import math
 import struct
 from collections.abc import Iterator
 
-from lidarcore.rplidar.emulated_scan import Motor, Packet, Room, packets
-from lidarcore.rplidar.emulator_options import EmulatorOptions
+from lidarcore.rplidar.emulation.options import EmulatorOptions
+from lidarcore.rplidar.emulation.scan import Motor, Packet, Room, packets
 from lidarcore.rplidar.protocol import (
     S1_MODES,
     Answer,

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from contextlib import closing, suppress
 
 from lidarcore.errors import DeviceError, NoDeviceError
-from lidarcore.rplidar.devices import find_devices
-from lidarcore.rplidar.handshake import identify
-from lidarcore.rplidar.port import Cancelled, ListPorts, Port
-from lidarcore.rplidar.session import Session
+from lidarcore.rplidar.connection.devices import find_devices
+from lidarcore.rplidar.connection.handshake import identify
+from lidarcore.rplidar.connection.port import Cancelled, ListPorts, Port
+from lidarcore.rplidar.connection.session import Session
 
 FIRST_PAUSE = 0.1  # s between two attempts, doubled from one to the next
 LONGEST_PAUSE = 5.0  # s

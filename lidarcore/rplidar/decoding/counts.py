@@ -1,7 +1,7 @@
 """What a decoder has seen."""
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 
 @dataclass
@@ -17,16 +17,20 @@ class Counts:
                  damaged_packets  packets that were in their place, but their checksum or check bit was wrong
                  missing_packets  capsules that never came, by the angle of the next one
                  unfit_packets    intact capsules and nodes whose angle does not fit those around
-                 partial_samples  samples of a turn whose beginning is unknown, after a start or an interruption
+    partial_samples  of turns whose beginning is unknown, after a start or an interruption: left out
     """
 
     bytes: int = 0
     packets: int = 0
     samples: int = 0
     revolutions: int = 0
+    partial_samples: int = 0
     dropped: Counter[str] = field(default_factory=Counter)
 
     def drop(self, reason: str, count: int = 1) -> None:
         """Count what was not used."""
         if count:
             self.dropped[reason] += count
+
+    def __add__(self, other: "Counts") -> "Counts":
+        return Counts(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(self)))

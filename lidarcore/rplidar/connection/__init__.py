@@ -1,0 +1,1 @@
+"""One sensor at one port: opening, asking, following, and finding it again."""
