@@ -1,10 +1,11 @@
 """The live source: an RPLIDAR at a port, or an emulated one, through the same driver."""
 
+import os
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Literal
 
@@ -13,9 +14,9 @@ from app.wire import DeviceJson
 from lidarcore import DeviceError, Scan
 from lidarcore.rplidar import Driver, find_devices
 from lidarcore.rplidar.capture import Stream
+from lidarcore.rplidar.connection.port import Tap
 from lidarcore.rplidar.driver import BAUD
 from lidarcore.rplidar.emulator_process import EmulatorProcess
-from lidarcore.rplidar.port import Tap
 
 HISTORY = 200  # revolutions kept for stepping back
 
@@ -40,7 +41,7 @@ class Taps:
 
 
 class LiveSource(Source):
-    """Revolutions as they come, numbered from 0; the last HISTORY can be stepped back to.
+    """Revolutions as they come, numbered from 0; the last HISTORY, and the one shown last, can be shown again.
 
     Connects when made, and streams from `start` on; raises DeviceError if there is no sensor to talk to.
     """
@@ -51,6 +52,7 @@ class LiveSource(Source):
         self.options = options
         self.kind: Literal["device", "emulator"] = "emulator" if options.emulated else "device"
         self._taps = taps
+        self._started = False
         self._changed: Callable[[], None] = lambda: None
         self.emulator = EmulatorProcess() if options.emulated else None
         try:
@@ -59,7 +61,7 @@ class LiveSource(Source):
                 baud=options.baud or BAUD,
                 mode=options.mode,
                 rpm=options.rpm,
-                tap=taps.bytes,
+                tap=self._tap,
                 on_change=lambda: self._changed(),
             ).__enter__()
         except BaseException:
@@ -67,6 +69,7 @@ class LiveSource(Source):
             raise
         self._lock = threading.Lock()
         self._kept: deque[tuple[Scan, float]] = deque(maxlen=HISTORY)
+        self._shown: tuple[int | None, tuple[Scan, float] | None] = (None, None)
         self._first_stamp = 0.0
         self._made = 0
 
@@ -81,10 +84,16 @@ class LiveSource(Source):
         return Stream(mode.answer_type, mode.us_per_sample, self._driver.baud)
 
     def nearest(self, index: int) -> int:
+        if index == self._shown[0]:
+            return index
         return max(self._made - len(self._kept), min(index, self._made - 1), 0)
 
     def scan(self, index: int) -> Scan | None:
-        return kept[0] if (kept := self._at(index)) else None
+        kept = self._at(index)
+        if kept is None:
+            return None
+        self._shown = index, kept  # however long it is looked at
+        return kept[0]
 
     def arrival(self, index: int) -> float:
         return kept[1] if (kept := self._at(index)) else time.monotonic()
@@ -93,7 +102,7 @@ class LiveSource(Source):
         return kept[0].stamp - self._first_stamp if (kept := self._at(index)) else 0.0
 
     def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
-        self._changed = progress
+        self._changed, self._started = progress, True
         threading.Thread(target=self._follow, args=(arrived,), name="live", daemon=True).start()
 
     def close(self) -> None:
@@ -102,10 +111,13 @@ class LiveSource(Source):
 
     def set_speed(self, rpm: int) -> None:
         self._driver.set_speed(rpm)
+        self.options = replace(self.options, rpm=rpm)
 
     def holds(self, port: str | None) -> bool:
         """Whether opening that port (None: the only one connected) would find it taken by this source."""
-        return self.kind == "device" and port in (None, self.options.port, self._driver.port)
+        return self.kind == "device" and (
+            port is None or os.path.realpath(port) == os.path.realpath(self._driver.port)
+        )
 
     def device(self) -> DeviceJson:
         driver, statistics = self._driver, self._driver.statistics
@@ -146,7 +158,14 @@ class LiveSource(Source):
             self.error = str(error)
             self._changed()
 
+    def _tap(self, direction: Literal["in", "out"], time: float, data: bytes) -> None:
+        """Only of the source that plays: another one may be tried meanwhile."""
+        if self._started:
+            self._taps.bytes(direction, time, data)
+
     def _at(self, index: int) -> tuple[Scan, float] | None:
+        if index == self._shown[0]:
+            return self._shown[1]
         with self._lock:
             place = index - (self._made - len(self._kept))
             return self._kept[place] if 0 <= place < len(self._kept) else None

@@ -237,5 +237,7 @@ class Player:
             "count": self._count(),
             "time": self._source.time(self._index),
         }
-        self._hand_over(Taken(scan, position, self._opened, self._source.arrival(self._index)))
+        # What is looked at again is not late.
+        arrival = time.monotonic() if self._paused else self._source.arrival(self._index)
+        self._hand_over(Taken(scan, position, self._opened, arrival))
         return True

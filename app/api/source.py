@@ -11,7 +11,7 @@ from app.live import DeviceOptions, LiveSource, Taps
 from app.player import SourceJson
 from app.problems import documented
 from app.runtime import Runtime
-from app.sources import RecordingSource
+from app.sources import RecordingSource, Source
 from lidarcore import DeviceError
 
 router = APIRouter(prefix="/source", tags=["source"])
@@ -108,19 +108,18 @@ def play(
     409 with the member `topics` if the recording has several lidar topics and none was chosen.
     """
     if isinstance(choice, Recording):
-        runtime.open(RecordingSource(library.path(choice.name), choice.topic), choice.index, choice.paused)
+        source: Source = RecordingSource(library.path(choice.name), choice.topic)
+        index, paused = choice.index, choice.paused
     else:
-        _go_live(
-            runtime,
-            DeviceOptions(**choice.model_dump(exclude={"kind"}), emulated=choice.kind == "emulator"),
-            taps,
-        )
+        options = DeviceOptions(**choice.model_dump(exclude={"kind"}), emulated=choice.kind == "emulator")
+        source, index, paused = _live(runtime, options, taps), 0, False
     recorder.stop()
+    runtime.open(source, index, paused)
     return runtime.player.describe()
 
 
-def _go_live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> None:
-    """Open the sensor; the one that plays has to let go of its port first, and gets it back if that fails."""
+def _live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> LiveSource:
+    """The sensor; the one that plays has to let go of its port first, and gets it back if that fails."""
     playing = runtime.player.source
     holder = (
         playing
@@ -130,7 +129,7 @@ def _go_live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> None:
     if holder:
         holder.close()
     try:
-        runtime.open(LiveSource(options, taps))
+        return LiveSource(options, taps)
     except DeviceError:
         if holder:
             runtime.open(LiveSource(holder.options, taps))

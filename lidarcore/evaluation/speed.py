@@ -11,6 +11,7 @@ from lidarcore import extraction
 from lidarcore.extraction import compare, extract
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, fit_beams
 from lidarcore.noise import SensorNoise
+from lidarcore.rplidar.protocol import Answer, StreamDecoder, encode_dense
 from lidarcore.scan import Array, Ints, Scan
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
@@ -73,11 +74,27 @@ def time_growth(beams: Iterable[int] = (1_000, 3_000, 10_000, 30_000, 100_000)) 
     return rows
 
 
+def time_decoding(capsules: int = 2000) -> list[Timing]:
+    """Dense capsules of an RPLIDAR S1 at 600 rpm into revolutions; it sends one of 40 samples every 4,320 us."""
+    stream = [encode_dense(15.552 * k % 360, np.arange(1000, 1040), sync=k == 0) for k in range(capsules)]
+    at_once, hundredfold = b"".join(stream), 43.2
+    return [
+        _time("one capsule, many at once", partial(_decode, [at_once]), capsules, hundredfold),
+        _time("one capsule, as it comes", partial(_decode, stream), capsules, hundredfold),
+    ]
+
+
 def simulated_scans(beams: int, scans: int, seed: int) -> list[Scan]:
     """Scans of the furnished room from random poses."""
     rng = np.random.default_rng(seed)
     sensor = SimulatedSensor(furnished_room(), NOISE, beams)
     return [sensor.scan(random_pose(sensor.world, rng), rng)[0] for _ in range(scans)]
+
+
+def _decode(pieces: list[bytes]) -> None:
+    decoder = StreamDecoder(Answer.DENSE, 108.0)
+    for k, piece in enumerate(pieces):
+        decoder.feed(piece, 0.00432 * k)
 
 
 def _each(call: Callable[..., object], beams: list[tuple[Array, Array]], fitters: Ints) -> None:
