@@ -17,7 +17,8 @@ from app.sources import check_readable
 MAX_BYTES = 1 << 30
 BUILTIN = tuple(sorted((Path(__file__).parent / "demo").glob("*.mcap")))
 BAG_FILES = (".db3", ".mcap")  # what makes a folder a ROS 2 bag
-PLAIN_NAME = re.compile(r"(?!\.)[^/\\:*?\"<>|\x00-\x1f\x7f]{1,200}(?<![. ])")  # a file name on every system
+# A file name on every system.
+PLAIN_NAME = re.compile(r"(?!\.)[^/\\:*?\"<>|\x00-\x1f\x7f\ud800-\udfff]{1,200}(?<![. ])")
 
 
 class RecordingJson(TypedDict):

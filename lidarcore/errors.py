@@ -51,3 +51,31 @@ class ProtectionStopError(DeviceError):
 
 class UnpluggedError(DeviceError):
     """The port went away while it was in use."""
+
+
+class LandmarkError(LidarError, ValueError):
+    """A landmark, or a question about landmarks, makes no sense: NaN, a covariance that is none, min above max."""
+
+
+class LandmarkMapError(LidarError):
+    """A map of landmarks cannot be read or written: no map, another version or unit, damaged, locked, disk full."""
+
+
+class UnknownLandmarkError(LandmarkMapError, LookupError):
+    """The map holds no landmark with this id."""
+
+
+class LocalizationError(LidarError, ValueError):
+    """What a filter was given cannot be used: shapes differ, or a number is not finite. Its state is untouched."""
+
+
+class CovarianceError(LocalizationError):
+    """A covariance is singular, not positive, not symmetric or not finite."""
+
+
+class MotionError(LocalizationError):
+    """The clock went back, or odometry is missing or has jumped."""
+
+
+class LostError(LocalizationError):
+    """The pose cannot be found from one scan alone: nothing in the map explains it, or several places do."""

@@ -7,8 +7,8 @@ import re
 
 import numpy as np
 
+from lidarcore.poses import PoseTrack, compose, inverse
 from lidarcore.recordings.laser_log import SICK_RANGE, LaserLog, Reading, numbers
-from lidarcore.recordings.poses import PoseTrack, compose, inverse
 from lidarcore.scan import Array
 
 _FRONT, _REAR = ("robot_frontlaser_offset", 0.0), ("robot_rearlaser_offset", np.pi)

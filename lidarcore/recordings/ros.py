@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from lidarcore.poses import PoseTrack, compose
 from lidarcore.recordings.base import Recording
 from lidarcore.recordings.beams import BEAMS, fits
-from lidarcore.recordings.poses import PoseTrack, compose
 from lidarcore.recordings.ros_frames import FrameTree, planar, rotation
 from lidarcore.recordings.ros_messages import LASER, ODOMETRY, Message, decode, frame, scan_of, seconds
 from lidarcore.scan import Array, Scan

@@ -1,5 +1,6 @@
 """Writes recordings: standard ROS 2 MCAP files, which Foxglove, Rerun and `ros2 bag` open."""
 
+import struct
 import time
 from importlib.metadata import version
 from os import PathLike
@@ -10,6 +11,7 @@ from typing import Any, Self
 from lidarcore.features import Features
 from lidarcore.recordings.base import NOMINAL_PERIOD
 from lidarcore.recordings.growing_file import GrowingFile
+from lidarcore.recordings.mcap import MAGIC
 from lidarcore.recordings.ros_messages import typestore
 from lidarcore.scan import Scan
 
@@ -20,6 +22,9 @@ CHUNK = 1 << 18
 """bytes of messages after which they are written in any case."""
 
 ELLIPSE_SCALE = 10.0  # sigma
+
+END = struct.pack("<BQI BQQQI", 15, 4, 0, 2, 20, 0, 0, 0) + MAGIC
+"""of an MCAP file without an index (DataEnd, Footer): makes it whole after every flush, for any reader."""
 
 
 class RecordingWriter:
@@ -32,7 +37,7 @@ class RecordingWriter:
     /features    visualization_msgs/MarkerArray: walls, corners and their ellipses, if features are given
 
     Times of recording follow the stamps, and go on by 0.1 s where the stamps do not grow. Whole scans are written
-    together, twice a second: after `kill -9` or on a full disk the file can be read up to there.
+    together, twice a second: after `kill -9` or on a full disk the file is whole up to there, without an index.
 
     `scans` is the number of scans written.
     Raises RecordingError, here and in every method, if the file exists already or cannot be written; see GrowingFile.
@@ -44,7 +49,7 @@ class RecordingWriter:
         from mcap.writer import Writer  # here: takes as long to import as all the rest
 
         self.scans = 0
-        self._file = GrowingFile(Path(path))
+        self._file = GrowingFile(Path(path), END)
         self._mcap = Writer(self._file, chunk_size=1 << 30)  # type: ignore[arg-type]  # chunks end with a flush only
         self._mcap.start("ros2", f"lidarcore {version('lidarcore')}")
         self._mcap.add_metadata("lidarcore", {"sensor": sensor})
@@ -89,7 +94,7 @@ class RecordingWriter:
         try:
             if self.scans:
                 self._mcap.finish()
-                self._file.flush()
+                self._file.complete()
         finally:
             self._file.close()
 

@@ -11,7 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 from recorded_scans import demo, single
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 
 from lidarcore import open_recording
 
@@ -43,6 +46,15 @@ def recording(path, how):
         process.stdout.close()
 
 
+def scans_for_others(path):
+    """How many scans the mcap library and rosbags find."""
+    with path.open("rb") as file:
+        mcap = sum(channel.topic == "/scan" for _, channel, _ in make_reader(file).iter_messages())
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
+        topics = [connection for connection in bag.connections if connection.topic == "/scan"]
+        return [mcap, sum(1 for _ in bag.messages(connections=topics))]
+
+
 def assert_holds(path, stamps):
     """The file opens, and holds the scans of these stamps, each as it was."""
     assert len(stamps) >= 3
@@ -51,6 +63,7 @@ def assert_holds(path, stamps):
     known = demo(5)
     for number, stamp in enumerate(stamps):
         np.testing.assert_array_equal(read[stamp].ranges, single(known[number % 5].ranges))
+    assert scans_for_others(path) == [len(read)] * 2
 
 
 def kill_and_check(path, delay):

@@ -1,6 +1,7 @@
 """Damaged files: a RecordingError, or what can be saved."""
 
 import gzip
+import re
 import struct
 
 import numpy as np
@@ -72,6 +73,9 @@ def samples(data, tmp_path_factory):
     return folder
 
 
+WHOLE_LINE = re.compile(rb"(\n|0x[0-9a-f]{2})\Z")
+
+
 def read(path):
     """All scans with the recording's notes, or None if it is refused with a clear error."""
     try:
@@ -110,9 +114,8 @@ def test_of_a_truncated_file_everything_before_the_cut_is_read(samples, tmp_path
         if name.endswith(IN_ONE_PIECE):
             assert len(scans) == len(whole)
         elif len(scans) < len(whole):
-            assert any("damaged" in note or "left out" in note for note in notes) or content[:cut].endswith(
-                b"\n"
-            )
+            told = any("damaged" in note or "left out" in note for note in notes)
+            assert told or WHOLE_LINE.search(content[:cut])  # which is what a shorter file looks like
 
     sweep()
 

@@ -12,6 +12,7 @@ from lidarcore.recordings import FORMATS, open_recording
 from lidarcore.recordings.streams import read_head
 
 RECORDINGS = {
+    "brenner_lego_arena_groundtruth/robot4_scan.txt": "LEGO robot log",
     "ccny_hokuyo_rosbag1/demo.bag": "ROS 1 bag",
     "rplidar_rosbag1/lidar.bag": "ROS 1 bag",
     "turtlebot4_rplidar_rosbag2/macfirst_floor_take_2": "ROS 2 bag",

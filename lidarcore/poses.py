@@ -1,13 +1,15 @@
 """Planar poses (x m, y m, heading rad) as arrays (3,): T_parent_child."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lidarcore.scan import Array
 
 
-def wrap(angle: float) -> float:
-    """Wrap an angle into (-pi, pi]."""
-    return float(np.pi - (np.pi - angle) % (2 * np.pi))
+def wrap(angles: ArrayLike) -> Array:
+    """Angles (...,) rad wrapped into (-pi, pi], the one place where they are; NaN stays NaN."""
+    wrapped: Array = np.pi - (np.pi - np.asarray(angles, np.float64)) % (2 * np.pi)
+    return wrapped
 
 
 def compose(T_a_b: Array, T_b_c: Array) -> Array:

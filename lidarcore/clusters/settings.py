@@ -1,0 +1,60 @@
+"""What a user can set about clusters: declared once, with unit, range and meaning."""
+
+from dataclasses import field
+from typing import Annotated
+
+from pydantic import ConfigDict, Field, field_validator
+from pydantic.dataclasses import dataclass
+
+from lidarcore.clusters.registry import CLUSTERERS
+from lidarcore.noise import SensorNoise
+
+
+def _metres(low: float, high: float, text: str) -> object:
+    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": "m"})
+
+
+@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+class ClusterSettings:
+    """How a scan becomes clusters. Metres; immutable, so a scan never sees a half change.
+
+    Which of them a method uses, beside min_points, max_range and noise, is in `CLUSTERERS[method].parameters`.
+    Raises pydantic.ValidationError, a ValueError that names the field and its bounds.
+    """
+
+    method: Annotated[
+        str, Field(description="clustering method", json_schema_extra={"enum": list(CLUSTERERS)})
+    ] = "heuristic"
+    distance: Annotated[
+        float, _metres(0.01, 10.0, "heuristic: consecutive points farther apart are different objects")
+    ] = 0.3
+    eps: Annotated[float, _metres(0.01, 10.0, "dbscan: points at most this far apart are neighbours")] = 0.3
+    min_points: Annotated[
+        int,
+        Field(
+            ge=2,
+            le=1000,
+            description="a cluster needs at least this many points, as for dbscan a dense neighbourhood does",
+        ),
+    ] = 3
+    k: Annotated[
+        int | None,
+        Field(
+            ge=1,
+            le=200,
+            description="kmeans, gmm: number of clusters, fewer where there are fewer points; none to choose it for "
+            "every scan from 1 to k_max, kmeans by the silhouette, gmm by the Bayesian information criterion",
+        ),
+    ] = None
+    k_max: Annotated[int, Field(ge=1, le=50, description="kmeans, gmm: most clusters to choose from")] = 12
+    max_range: Annotated[
+        float | None, _metres(0.1, 1000.0, "points farther from the sensor are left out; none for all")
+    ] = None
+    noise: SensorNoise = field(default_factory=SensorNoise)
+
+    @field_validator("method")
+    @classmethod
+    def _known_method(cls, name: str) -> str:
+        if name not in CLUSTERERS:
+            raise ValueError(f"unknown method {name!r}: choose one of {', '.join(CLUSTERERS)}")
+        return name

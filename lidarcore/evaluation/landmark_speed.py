@@ -1,0 +1,136 @@
+"""How long a large map of landmarks takes to answer while it is written to: `python -m` this module."""
+
+import argparse
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from lidarcore.landmarks import Box, Circle, Filter, Landmark, LandmarkMap
+from lidarcore.scan import Array
+
+DENSITY = 1.0  # landmarks per m²
+WRITES_HZ, WRITTEN = 10, 12  # what a live run puts: so many landmarks so often
+LIMIT_MS = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Latency:
+    """Median and 99th percentile of one kind of question, ms; and of the yardstick asked in turn with it."""
+
+    what: str
+    median: float
+    p99: float
+    yardstick_p99: float
+
+
+def measure_landmark_queries(
+    path: Path, landmarks: int, questions: int = 1000, seed: int = 0
+) -> list[Latency]:
+    """Latencies of a map of so many landmarks, made at `path` if it is not there, while another connection writes.
+
+    The yardstick is reading one landmark by its id: it tells what the machine, not the query, does to the slowest.
+    """
+    rng, side = np.random.default_rng(seed), float(np.sqrt(landmarks / DENSITY))
+    new = not path.exists()
+    with LandmarkMap(path) as landmark_map, LandmarkMap(path) as other:
+        if new:
+            landmark_map.put(random_landmarks(landmarks, side, rng))
+        with _writing(other, landmarks):
+            return [
+                _latency(what, ask, landmark_map, side, questions, rng)
+                for what, ask in _questions(landmark_map, side).items()
+            ]
+
+
+def random_landmarks(n: int, side: float, rng: np.random.Generator) -> Iterator[Landmark]:
+    """Landmarks all over a square of this side (m), standard deviations from 3 mm to 0.3 m."""
+    xy, sigma = rng.uniform(0, side, (n, 2)), 10 ** rng.uniform(-2.5, -0.5, (n, 2))
+    for (x, y), (a, b), rho in zip(
+        xy.tolist(), sigma.tolist(), rng.uniform(-0.9, 0.9, n).tolist(), strict=True
+    ):
+        yield Landmark(x, y, a * a, rho * a * b, b * b, "corner" if rho > 0 else "cluster", "ml", 1)
+
+
+def _questions(landmark_map: LandmarkMap, side: float) -> dict[str, Callable[[Array], object]]:
+    corners = Filter(kinds=("corner",), max_sigma=0.2)
+    noise = 0.02**2 * np.eye(2)
+    questions: dict[str, Callable[[Array], object]] = {
+        f"box of {width:g} m, a page of {page}": partial(_ask_box, landmark_map, width, page)
+        for width, page in ((10, 100), (100, 100), (side / 2, 100), (30, 1000))
+    }
+    nearest = landmark_map.nearest
+    return questions | {
+        "circle of 10 m": lambda p: landmark_map.find(Circle(p[0], p[1], 10.0)),
+        "nearest": lambda p: nearest(p),
+        "10 nearest": lambda p: nearest(p, 10),
+        "10 nearest corners, sigma below 0.2 m": lambda p: nearest(p, 10, corners),
+        "10 nearest, Mahalanobis, 20 mm noise": lambda p: nearest(
+            p, 10, metric="mahalanobis", covariance=noise
+        ),
+        "nearest in a gate of 3, Mahalanobis": lambda p: nearest(
+            p, within=3.0, metric="mahalanobis", covariance=noise
+        ),
+    }
+
+
+def _ask_box(landmark_map: LandmarkMap, width: float, page: int, middle: Array) -> object:
+    return landmark_map.find(Box(*(middle - width / 2), *(middle + width / 2)), limit=page)
+
+
+def _latency(
+    what: str, ask: Callable[[Array], object], landmark_map: LandmarkMap, side: float, n: int,
+    rng: np.random.Generator,
+) -> Latency:  # fmt: skip
+    took = np.empty((n, 2))
+    for i, (place, id) in enumerate(zip(rng.uniform(0, side, (n, 2)), rng.integers(1, 1000, n), strict=True)):
+        before = time.perf_counter()
+        ask(place)
+        between = time.perf_counter()
+        landmark_map[int(id)]
+        took[i] = between - before, time.perf_counter() - between
+    p99 = 1e3 * np.percentile(took, 99, axis=0)
+    return Latency(what, 1e3 * float(np.median(took[:, 0])), float(p99[0]), float(p99[1]))
+
+
+@contextmanager
+def _writing(landmark_map: LandmarkMap, n: int) -> Iterator[None]:
+    """A thread that updates landmarks as a live run does, as long as the block runs."""
+    stop = threading.Event()
+
+    def write() -> None:
+        second = 0
+        while not stop.wait(1 / WRITES_HZ):
+            second += 1
+            ids = np.linspace(1, n, WRITTEN, dtype=int).tolist()
+            seen = (landmark_map[id] for id in ids)
+            landmark_map.put([replace(mark, count=mark.count + 1, last_seen=float(second)) for mark in seen])
+
+    thread = threading.Thread(target=write)
+    thread.start()
+    try:
+        yield
+    finally:
+        stop.set()
+        thread.join()
+
+
+def main() -> None:
+    """Print the latencies of a map of a million landmarks, which takes about a minute to make."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--landmarks", type=int, default=1_000_000)
+    with tempfile.TemporaryDirectory() as folder:
+        for row in measure_landmark_queries(Path(folder) / "map.db", parser.parse_args().landmarks):
+            judged = "ok" if row.p99 <= LIMIT_MS else "missed"
+            print(f"{row.what:40} median {row.median:6.2f} ms, p99 {row.p99:6.2f} ms ({judged}), "
+                  f"yardstick p99 {row.yardstick_p99:.2f} ms")  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,185 @@
+"""Maps of landmarks as JSON, CSV and GeoJSON, always in metres and saying so.
+
+Exchanged are the landmarks as they are; their history and the sessions stay in the database.
+"""
+
+import csv
+import dataclasses
+import json
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TextIO
+
+from lidarcore.errors import LandmarkError, LandmarkMapError
+from lidarcore.landmarks.landmark import COLUMNS, Landmark
+from lidarcore.landmarks.store import LandmarkMap
+
+Row = dict[str, Any]
+
+_HEADER = {"format": "lidarcore landmarks", "version": 1, "unit": "m"}
+_REQUIRED = {"x", "y", "var_x", "cov_xy", "var_y", "kind"}
+_UNITS = {
+    "x": "m",
+    "y": "m",
+    "var_x": "m2",
+    "cov_xy": "m2",
+    "var_y": "m2",
+    "first_seen": "s",
+    "last_seen": "s",
+}
+_CSV_NAMES = {name: f"{name}_{_UNITS[name]}" if name in _UNITS else name for name in COLUMNS}
+_CSV_TYPES: dict[str, Callable[[str], Any]] = {"id": int, "count": int, **dict.fromkeys(_UNITS, float)}
+
+
+def export_map(landmark_map: LandmarkMap, path: str | Path) -> None:
+    """Write all landmarks; the suffix (.json, .csv, .geojson) says the format. The file appears when complete.
+
+    Raises LandmarkMapError for another suffix or a file that cannot be written.
+    """
+    path = Path(path)
+    name, partial = _format(path), path.with_name(f".{path.name}.part")
+    with _explained(path.name):
+        try:
+            with partial.open("w", encoding="utf-8", newline="") as file:
+                write_landmarks(landmark_map, file, name)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def import_map(landmark_map: LandmarkMap, path: str | Path, replace: bool = False) -> list[int]:
+    """Add the landmarks of a file under new ids, or `replace` the map by them, with the file's ids; the ids.
+
+    Nothing is changed unless every landmark is good. Raises LandmarkMapError if the file cannot be read, is of
+    another format, version or unit, or holds a landmark that makes no sense, which the message names.
+    """
+    path = Path(path)
+    with _explained(path.name), path.open(encoding="utf-8-sig", newline="") as file:
+        landmarks = list(read_landmarks(file, _format(path)))
+    if replace:
+        return landmark_map.replace(landmarks)
+    return landmark_map.put(dataclasses.replace(landmark, id=None) for landmark in landmarks)
+
+
+def write_landmarks(landmarks: Iterable[Landmark], file: TextIO, name: str) -> None:
+    """Write to a text file (opened with newline="") in one of FORMATS."""
+    FORMATS[name].write(({column: getattr(mark, column) for column in COLUMNS} for mark in landmarks), file)
+
+
+def read_landmarks(file: TextIO, name: str) -> Iterator[Landmark]:
+    """Landmarks of a text file in one of FORMATS; raises LandmarkMapError."""
+    with _explained(f"This {name}"):
+        for number, row in enumerate(FORMATS[name].read(file), 1):
+            if wrong := (_REQUIRED - set(row)) | (set(row) - set(COLUMNS)):
+                raise LandmarkMapError(
+                    f"Landmark {number} lacks or has beyond need: {', '.join(sorted(wrong))}."
+                )
+            try:
+                yield Landmark(**row)
+            except LandmarkError as error:
+                raise LandmarkMapError(f"Landmark {number}: {error}") from error
+
+
+def _write_csv(rows: Iterable[Row], file: TextIO) -> None:
+    writer = csv.writer(file)
+    writer.writerow(_CSV_NAMES.values())
+    writer.writerows(row.values() for row in rows)
+
+
+def _read_csv(file: TextIO) -> Iterator[Row]:
+    reader = csv.reader(file, strict=True)
+    header = next(reader, [])
+    names = {csv_name: name for name, csv_name in _CSV_NAMES.items()}
+    if unknown := [name for name in header or [""] if name not in names]:
+        raise LandmarkMapError(f"Columns {unknown} are none of {list(names)}: name and convert them so.")
+    for values in reader:
+        texts = dict(zip((names[name] for name in header), values, strict=True))
+        yield {
+            name: _CSV_TYPES.get(name, str)(text) for name, text in texts.items() if text or name == "method"
+        }
+
+
+def _write_json(rows: Iterable[Row], file: TextIO) -> None:
+    _write_document(_HEADER, "landmarks", rows, file)
+
+
+def _read_json(file: TextIO) -> list[Row]:
+    return _items(file, "landmarks")
+
+
+def _write_geojson(rows: Iterable[Row], file: TextIO) -> None:
+    _write_document({"type": "FeatureCollection"} | _HEADER, "features", map(_feature, rows), file)
+
+
+def _read_geojson(file: TextIO) -> Iterator[Row]:
+    for feature in _items(file, "features"):
+        try:
+            x, y = feature["geometry"]["coordinates"]
+            yield {"x": x, "y": y, **feature["properties"]} | (
+                {"id": feature["id"]} if "id" in feature else {}
+            )
+        except (KeyError, TypeError) as error:
+            raise LandmarkMapError(
+                f"This is no Point with properties: {json.dumps(feature)[:200]}"
+            ) from error
+
+
+def _feature(row: Row) -> Row:
+    properties = {name: value for name, value in row.items() if name not in ("id", "x", "y")}
+    point = {"type": "Point", "coordinates": [row["x"], row["y"]]}
+    return {"type": "Feature", "id": row["id"], "geometry": point, "properties": properties}
+
+
+def _write_document(head: Row, key: str, items: Iterable[Row], file: TextIO) -> None:
+    """A JSON object with one item a line, written as they come."""
+    file.write(f"{json.dumps(head)[:-1]}, {json.dumps(key)}: [")
+    separator = "\n"
+    for item in items:
+        file.write(separator + json.dumps(item, allow_nan=False))
+        separator = ",\n"
+    file.write("\n]}\n")
+
+
+def _items(file: TextIO, key: str) -> list[Row]:
+    """The items of such a JSON object, if it is one of this format, version and unit."""
+    document = json.load(file)
+    if not isinstance(document, dict):
+        raise LandmarkMapError(f"This holds no object with {key}: export a map to see what is expected.")
+    if (head := {name: document.get(name) for name in _HEADER}) != _HEADER:
+        raise LandmarkMapError(f"This says {head}, expected is {_HEADER}: convert it, or update lidarcore.")
+    items = document.get(key)
+    if not (isinstance(items, list) and all(isinstance(item, dict) for item in items)):
+        raise LandmarkMapError(f"{key} is no list of objects.")
+    return items
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """How rows of a landmark's fields are written to a text file and read back."""
+
+    write: Callable[[Iterable[Row], TextIO], None]
+    read: Callable[[TextIO], Iterable[Row]]
+
+
+FORMATS = {
+    "json": Format(_write_json, _read_json),
+    "csv": Format(_write_csv, _read_csv),
+    "geojson": Format(_write_geojson, _read_geojson),
+}
+
+
+def _format(path: Path) -> str:
+    name = path.suffix.lower().removeprefix(".")
+    if name not in FORMATS:
+        raise LandmarkMapError(f"{path.name} should end in .{', .'.join(FORMATS)}, which says the format.")
+    return name
+
+
+@contextmanager
+def _explained(what: str) -> Iterator[None]:
+    try:
+        yield
+    except (OSError, ValueError, csv.Error, RecursionError) as error:
+        raise LandmarkMapError(f"{what} cannot be read or written: {error}.") from error

@@ -1,0 +1,90 @@
+"""What a filter says after each scan, and the instants between which it moves."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lidarcore.errors import LocalizationError, MotionError
+from lidarcore.localization.association import Association
+from lidarcore.localization.kalman import Innovation
+from lidarcore.localization.settings import LocalizationSettings
+from lidarcore.poses import compose, inverse, wrap
+from lidarcore.scan import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """The pose after one scan.
+
+    stamp       s
+    pose        (3,) T_world_sensor: x m, y m, heading rad in (-pi, pi]
+    covariance  (3, 3) of the pose
+    velocity    (2,) m/s and rad/s, or None if odometry moves the filter
+    innovation  of the pairs that were used, with the association they are part of
+    """
+
+    stamp: float
+    pose: Array
+    covariance: Array
+    velocity: Array | None
+    innovation: Innovation
+
+    @property
+    def association(self) -> Association:
+        """Which observation was taken for which landmark, and which for none."""
+        return self.innovation.association
+
+    @property
+    def coasting(self) -> bool:
+        """True if nothing matched: the pose is only predicted, and its covariance has grown."""
+        return len(self.association.observed) == 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Instant:
+    """A stamp in s, and T_odom_sensor (3,) there if a wheel says so.
+
+    Raises LocalizationError if a number is not finite.
+    """
+
+    stamp: float
+    odometry: Array | None = None
+
+    def __post_init__(self) -> None:
+        if not np.isfinite(self.stamp):
+            raise LocalizationError(f"The stamp is {self.stamp}: give seconds.")
+        if self.odometry is not None:
+            object.__setattr__(self, "odometry", as_pose(self.odometry, "odometry"))
+
+    def until(self, later: "Instant", settings: LocalizationSettings) -> tuple[float, Array | None]:
+        """Seconds to a later instant, and the increment (3,) that odometry gives, seen from here.
+
+        Raises MotionError if the clock went back, or odometry is missing or moved faster than the settings allow.
+        """
+        dt = later.stamp - self.stamp
+        if dt < 0:
+            raise MotionError(
+                f"The clock went back by {-dt:g} s: leave the scan out, or call restart_clock after a reset."
+            )
+        if settings.motion == "constant velocity":
+            return dt, None
+        if self.odometry is None or later.odometry is None:
+            raise MotionError('The scan has no odometry: give it, or set motion to "constant velocity".')
+        increment = compose(inverse(self.odometry), later.odometry)
+        way, turn = float(np.hypot(*increment[:2])), abs(float(increment[2]))
+        if way > settings.max_speed * dt or turn > settings.max_turn_rate * dt:
+            raise MotionError(
+                f"Odometry jumped by {way:.3g} m and {turn:.3g} rad in {dt:.3g} s: an encoder was reset or wrapped "
+                "around. Leave the scan out, or call restart_clock to go on from the new values."
+            )
+        return dt, increment
+
+
+def as_pose(values: ArrayLike, name: str) -> Array:
+    """A pose (3,) with its heading wrapped. Raises LocalizationError if it is none."""
+    pose = np.array(values, np.float64)
+    if pose.shape != (3,) or not np.isfinite(pose).all():
+        raise LocalizationError(f"{name} is {pose}: give x (m), y (m) and heading (rad), all finite.")
+    pose[2] = wrap(pose[2])
+    return pose

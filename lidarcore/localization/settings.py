@@ -1,0 +1,96 @@
+"""What a user can set about localization: declared once, with unit, range and meaning."""
+
+from dataclasses import field
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import ConfigDict, Field, model_validator
+from pydantic.dataclasses import dataclass
+
+from lidarcore.scan import Array
+
+_CONFIG = ConfigDict(extra="forbid")
+
+
+def _number(low: float, high: float, unit: str, text: str) -> object:
+    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": unit})
+
+
+@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+class OdometryNoise:
+    """Random walk of odometry: variances grow with the way and the turn, however finely they are cut into steps."""
+
+    along: Annotated[float, _number(1e-4, 1, "m/√m", "standard deviation ahead after one metre")] = 0.03
+    across: Annotated[float, _number(1e-4, 1, "m/√m", "standard deviation sideways after one metre")] = 0.01
+    heading_per_metre: Annotated[
+        float, _number(1e-4, 1, "rad/√m", "standard deviation of the heading after one metre")
+    ] = 0.02
+    heading_per_radian: Annotated[
+        float, _number(1e-4, 1, "rad/√rad", "standard deviation of the heading after turning one radian")
+    ] = 0.05
+    slip_per_radian: Annotated[
+        float, _number(0, 1, "m/√rad", "standard deviation of the position after turning one radian")
+    ] = 0.01
+
+    def covariance(self, increment: Array) -> Array:
+        """Covariance (3, 3) of an increment (3,) m, m, rad, in the sensor frame before the step."""
+        way, turn = float(np.hypot(increment[0], increment[1])), float(abs(increment[2]))
+        slip = self.slip_per_radian**2 * turn
+        return np.diag(
+            [
+                self.along**2 * way + slip,
+                self.across**2 * way + slip,
+                self.heading_per_metre**2 * way + self.heading_per_radian**2 * turn,
+            ]
+        )
+
+
+@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+class VelocityNoise:
+    """White accelerations of the constant-velocity model."""
+
+    acceleration: Annotated[float, _number(1e-4, 50, "m/s/√s", "change of the speed within a second")] = 0.5
+    turn_acceleration: Annotated[
+        float, _number(1e-4, 50, "rad/s/√s", "change of the turn rate within a second")
+    ] = 1.0
+    speed: Annotated[float, _number(1e-3, 50, "m/s", "standard deviation of the speed at the start")] = 1.0
+    turn_rate: Annotated[
+        float, _number(1e-3, 50, "rad/s", "standard deviation of the turn rate at the start")
+    ] = 1.0
+
+
+@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+class LocalizationSettings:
+    """How the filter moves, matches and keeps landmarks. Immutable; pydantic.ValidationError names a wrong field."""
+
+    motion: Annotated[
+        Literal["odometry", "constant velocity"], Field(description="what predicts the pose between scans")
+    ] = "odometry"
+    odometry: OdometryNoise = field(default_factory=OdometryNoise)
+    velocity: VelocityNoise = field(default_factory=VelocityNoise)
+    max_speed: Annotated[float, _number(0.01, 100, "m/s", "odometry that is faster has jumped")] = 3.0
+    max_turn_rate: Annotated[float, _number(0.01, 100, "rad/s", "odometry that turns faster has jumped")] = (
+        6.0
+    )
+    gate: Annotated[
+        float, _number(0.5, 0.9999, "", "share of the true pairs that the chi-square gate lets through")
+    ] = 0.99
+    new_gate: Annotated[
+        float, _number(0.9, 0.999999999, "", "a new landmark lies outside this gate of every known one")
+    ] = 0.99999
+    ambiguity: Annotated[
+        float, _number(1, 1e3, "", "a pair is ambiguous if it is not this many times likelier than another")
+    ] = 10.0
+    confirm: Annotated[int, Field(ge=1, le=1000, description="sightings that confirm a landmark")] = 4
+    memory: Annotated[
+        int, Field(ge=1, le=10000, description="sightings that count against views without it")
+    ] = 10
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "LocalizationSettings":
+        if self.new_gate <= self.gate:
+            raise ValueError(f"new_gate {self.new_gate} is not above gate {self.gate}: raise it")
+        # Otherwise leaving a pair unmatched could count as the alternative that makes it ambiguous.
+        if np.log(self.ambiguity) >= np.log((1 - self.gate) / (1 - self.new_gate)):
+            raise ValueError("ambiguity is too large for these gates: lower it, or raise new_gate")
+        return self

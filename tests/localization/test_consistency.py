@@ -1,0 +1,53 @@
+"""Average normalised estimation error squared (ANEES): 1 for a filter whose covariance is what its errors show."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from walks import PERIOD, POSTS, START_COVARIANCE, Walk, nees, sight, true_path, walk
+
+from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
+from lidarcore.scan import Array
+
+RUNS, STEPS = 100, 120
+SETTINGS = LocalizationSettings()
+BAND = chi2.ppf([0.025, 0.975], 3 * RUNS) / (3 * RUNS)
+
+
+def anees(run: Callable[[Walk, np.random.Generator], list[float]]) -> Array:
+    """ANEES (STEPS,) over the runs."""
+    poses = true_path(STEPS)
+    seen = [sight(pose) for pose in poses]
+    rng = np.random.default_rng(4)
+    errors = [run(walk(rng, SETTINGS, poses, seen), rng) for _ in range(RUNS)]
+    return np.mean(errors, axis=0) / 3
+
+
+def localize(walk: Walk, rng: np.random.Generator) -> list[float]:
+    start = rng.multivariate_normal(walk.poses[0], START_COVARIANCE)
+    surveyed = rng.normal(POSTS, 0.002)
+    localizer = Localizer(Points(surveyed, 0.002**2 * np.eye(2), "post"), start, START_COVARIANCE, SETTINGS)
+    errors = []
+    for k, (truth, odometry, seen) in enumerate(zip(walk.poses, walk.odometry, walk.sightings, strict=True)):
+        estimate = localizer.step(seen, PERIOD * k, odometry)
+        errors.append(nees(estimate.pose - truth, estimate.covariance))
+    return errors
+
+
+def map_and_localize(walk: Walk, rng: np.random.Generator) -> list[float]:
+    slam = Slam(SETTINGS, rng.multivariate_normal(walk.poses[0], START_COVARIANCE), START_COVARIANCE)
+    errors = []
+    for k, (truth, odometry, seen) in enumerate(zip(walk.poses, walk.odometry, walk.sightings, strict=True)):
+        estimate = slam.step(seen, PERIOD * k, odometry)
+        errors.append(nees(estimate.pose - truth, estimate.covariance))
+    return errors
+
+
+@pytest.mark.parametrize("run", [localize, map_and_localize])
+def test_the_covariance_is_what_the_errors_show(
+    run: Callable[[Walk, np.random.Generator], list[float]],
+) -> None:
+    inside = (BAND[0] <= (values := anees(run))) & (values <= BAND[1])
+    print(inside.mean(), values.mean(), values[::10])
+    assert inside.mean() >= 0.9, f"{inside.mean():.0%} inside, mean ANEES {values.mean():.3f}"

@@ -1,0 +1,49 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lidarcore import Scan, extract
+from lidarcore.errors import LocalizationError
+from lidarcore.localization.deskew import deskew
+from lidarcore.localization.motion import arc
+from lidarcore.simulation.rooms import rectangular_room
+
+TIMES = np.linspace(0, 0.1, 600)
+BEARINGS = np.linspace(-3.1, 3.1, 600)
+ROOM = rectangular_room(6, 4)
+
+
+def moving_scan(v: float, w: float) -> Scan:
+    """A noiseless scan of the room from the origin on, along the arc of v and w."""
+    poses = np.array([arc(v, w, time)[0] for time in TIMES])
+    ranges, _ = ROOM.cast(poses, BEARINGS)
+    return Scan(ranges, BEARINGS, beam_times=TIMES)
+
+
+@given(st.floats(-2, 2), st.floats(-3, 3))
+def test_every_point_of_a_deskewed_scan_lies_on_a_wall(v: float, w: float) -> None:
+    x, y = np.abs(deskew(moving_scan(v, w), v, w).xy).T
+    assert np.minimum(np.abs(x - 3), np.abs(y - 2)).max() < 1e-9
+
+
+def test_deskewing_brings_the_corners_back_to_where_they_are() -> None:
+    v, w = 1.5, 2.0
+    scan = moving_scan(v, w)
+    errors = [np.abs(np.abs(extract(seen).corners.xy) - [3, 2]).max() for seen in (scan, deskew(scan, v, w))]
+    assert errors[0] > 0.1
+    assert errors[1] < 1e-3
+
+
+def test_a_missing_return_stays_missing() -> None:
+    ranges = np.full(600, 2.0)
+    ranges[100:110] = np.nan
+    straightened = deskew(Scan(ranges, BEARINGS, beam_times=TIMES), 1.0, 1.0)
+    assert (~straightened.valid).sum() == 10
+
+
+def test_without_beam_times_it_says_so() -> None:
+    with pytest.raises(LocalizationError, match="no beam times"):
+        deskew(Scan(np.ones(5), BEARINGS[:5]), 1, 0)
+    with pytest.raises(LocalizationError, match="finite"):
+        deskew(moving_scan(0, 0), np.nan, 0)

@@ -1,0 +1,54 @@
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2
+from walks import POSTS, nees, sight, sighting, true_path
+
+from lidarcore.errors import LostError
+from lidarcore.localization import Localizer, Points
+from lidarcore.localization.relocalization import relocalize
+
+MAP = Points(POSTS, 1e-6 * np.eye(2), "post")
+
+
+def test_the_pose_is_found_from_one_scan_and_its_covariance_is_honest() -> None:
+    rng = np.random.default_rng(6)
+    poses, inside = true_path(110), 0
+    for pose in poses:
+        found = relocalize(sighting(rng, pose, POSTS[sight(pose)]), MAP)
+        inside += nees(found.pose - pose, found.covariance) < chi2.ppf(0.95, 3)
+    low, high = binom.ppf([0.001, 0.999], len(poses), 0.95)
+    assert low <= inside <= high
+
+
+def test_points_that_are_not_in_the_map_do_no_harm() -> None:
+    rng, pose = np.random.default_rng(7), np.array([3.0, 1.2, 2.0])
+    strangers = rng.uniform([0.5, 0.5], [5.5, 4.5], (3, 2))
+    found = relocalize(sighting(rng, pose, np.concatenate([POSTS[:9], strangers])), MAP)
+    np.testing.assert_allclose(found.pose, pose, atol=0.06)
+    assert {(i, i) for i in range(9)} <= set(map(tuple, found.pairs))
+
+
+def test_in_a_symmetric_room_it_says_that_several_places_look_alike() -> None:
+    corners = np.array([[0.0, 0.0], [6.0, 0.0], [6.0, 4.0], [0.0, 4.0]])
+    seen = sighting(np.random.default_rng(0), np.array([2.0, 1.0, 0.3]), corners)
+    with pytest.raises(LostError, match="Several poses explain 4 of the 4"):
+        relocalize(seen, Points(corners, 1e-6 * np.eye(2), "post"))
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_too_few_points_are_not_enough(count: int) -> None:
+    seen = sighting(np.random.default_rng(0), np.array([2.0, 1.0, 0.3]), POSTS[:count])
+    with pytest.raises(LostError, match=f"No pose explains 4 of the {count}"):
+        relocalize(seen, MAP)
+
+
+def test_a_lost_localizer_goes_on_from_where_it_was_found() -> None:
+    rng, pose = np.random.default_rng(9), np.array([9.0, 1.2, -1.0])
+    seen = sighting(rng, pose, POSTS[sight(pose)])
+    localizer = Localizer(MAP, [1.0, 4.0, 2.0], 1e-4 * np.eye(3))
+    assert localizer.step(seen, 0.0, pose).coasting
+    found = relocalize(seen, MAP)
+    localizer.reset(found.pose, found.covariance)
+    estimate = localizer.step(sighting(rng, pose, POSTS[sight(pose)]), 0.1, pose)
+    assert not estimate.coasting
+    np.testing.assert_allclose(estimate.pose, pose, atol=0.06)
