@@ -11,6 +11,7 @@ from lidarcore.rplidar.protocol import Answer, Revolution
 from lidarcore.scan import Scan
 
 BYTE = re.compile(rb"\b(?:0[xX])?([0-9a-fA-F]{2})\b")
+HALF_A_BYTE = re.compile(rb"\s(?:0[xX]?|(?:0[xX])?[0-9a-fA-F])\Z")
 COMMENT = re.compile(rb"->[^\n]*")
 
 
@@ -28,7 +29,10 @@ class RplidarHex(Recording):
         self._remark(f"There are no stamps: revolutions are taken to be {NOMINAL_PERIOD} s apart.")
 
     def _scans(self) -> Iterator[Callable[[], Scan]]:
-        data = bytes.fromhex(b"".join(BYTE.findall(COMMENT.sub(b"", self._content()))).decode())
+        content = self._content()
+        if HALF_A_BYTE.search(content):
+            self._remark("The dump is damaged or cut short: its last byte is incomplete.")
+        data = bytes.fromhex(b"".join(BYTE.findall(COMMENT.sub(b"", content))).decode())
         listener = Listener(None if BEGINNING.search(data) else Answer.NODES)
         for index, revolution in enumerate(listener.received(data, 0.0)):
             yield partial(_scan, revolution, NOMINAL_PERIOD * index)
