@@ -3,6 +3,7 @@
 import errno
 import ipaddress
 import secrets
+import signal
 import socket
 import webbrowser
 from contextlib import suppress
@@ -31,7 +32,10 @@ def listen(host: str, port: int) -> socket.socket:
         listening = socket.create_server((host, port), family=family)
     except OSError as error:
         if error.errno == errno.EADDRINUSE:
-            raise AddressError(f"Port {port} of {host} is in use: choose another one with --port.") from error
+            free = f"--http-port {port + 1} (make run PORT={port + 1})"
+            raise AddressError(
+                f"Port {port} of {host} is in use: choose another one, such as {free}."
+            ) from error
         raise AddressError(f"Cannot listen on {host} port {port}: {error.strerror or error}.") from error
     listening.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
     return listening
@@ -50,6 +54,8 @@ def serve(options: "ServerOptions", listening: socket.socket, host: str, *, open
     from app.server import create_app
 
     server = uvicorn_server(create_app(options))
+    if hasattr(signal, "SIGHUP"):  # the terminal was closed: the motor is to be stopped then, too
+        signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
     url = address(listening, host, options.token)
     print(f"lidarcore serves {url}", flush=True)
     print("Stop with Ctrl-C.", flush=True)

@@ -83,7 +83,7 @@ class Scan:
         return len(self.ranges)
 
     def __repr__(self) -> str:
-        return f"Scan({len(self)} beams, {int(self.valid.sum())} returns, stamp={self.stamp:g} s)"
+        return f"Scan({len(self)} beams, {int(self.valid.sum())} returns, stamp={self.stamp:.3f} s)"
 
     @cached_property
     def valid(self) -> NDArray[np.bool_]:

@@ -30,7 +30,8 @@ function kindButton(kind) {
 
 /** Opens the only device, an emulator, or the recording that played last. */
 async function choose(kind) {
-  if (kind === get("source").kind) return;
+  const source = get("source");
+  if (kind === source.kind && !source.error) return;
   if (kind !== "recording") await open({ kind });
   else await openRecording();
 }
