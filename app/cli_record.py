@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from lidarcore import ExtractionSettings
     from lidarcore.rplidar.driver import Driver
 
+LONGEST = 1e8  # s, three years; a timer has an end
+
 
 def record(
     output: Annotated[Path, typer.Argument(help="FILE.mcap, which must not exist yet")],
@@ -32,17 +34,20 @@ def record(
     """Record a sensor into a file until Ctrl-C, without the page."""
     if emulator and port is not None:
         raise typer.BadParameter("give --port or --emulator, not both.")
+    if duration is not None and not duration <= LONGEST:
+        raise typer.BadParameter(f"--duration is at most {LONGEST:g} s; without, it is until Ctrl-C.")
     from app.recorder import AsyncRecorder
     from lidarcore import warm_up
-    from lidarcore.rplidar.driver import Driver
+    from lidarcore.rplidar.driver import Driver, check_wishes
     from lidarcore.rplidar.emulator_process import EmulatorProcess
 
+    check_wishes(mode if emulator else None, rpm)  # what modes a real one has it has to be asked
     chosen = settings_from(settings, set_)
+    _end_like_ctrl_c()
     recorder = AsyncRecorder()
-    recorder.start(output, raw=raw, ellipse_scale=chosen.view.ellipse_scale)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     with suppress(KeyboardInterrupt), ExitStack() as stack:
         stack.callback(recorder.stop)
+        recorder.start(output, raw=raw, ellipse_scale=chosen.view.ellipse_scale)
         warm_up()
         if emulator:
             port = stack.enter_context(EmulatorProcess()).port
@@ -50,6 +55,14 @@ def record(
         stack.enter_context(_progress(recorder, driver))
         _follow(driver, recorder, duration, chosen.extraction)
     _conclude(output, recorder.status)
+
+
+def _end_like_ctrl_c() -> None:
+    """SIGTERM, and SIGHUP unless `nohup` has it ignored, end the recording and close it."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        if number and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
 
 
 def _follow(

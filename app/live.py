@@ -1,5 +1,6 @@
 """The live source: an RPLIDAR at a port, or an emulated one, through the same driver."""
 
+import logging
 import os
 import threading
 import time
@@ -14,11 +15,13 @@ from app.wire import DeviceJson
 from lidarcore import DeviceError, Scan
 from lidarcore.rplidar import Driver, find_devices
 from lidarcore.rplidar.capture import Stream
-from lidarcore.rplidar.connection.port import Tap
-from lidarcore.rplidar.driver import BAUD
+from lidarcore.rplidar.connection.port import Tap, path_of
+from lidarcore.rplidar.driver import BAUD, check_wishes
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
 HISTORY = 200  # revolutions kept for stepping back
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -52,9 +55,12 @@ class LiveSource(Source):
         self.options = options
         self.kind: Literal["device", "emulator"] = "emulator" if options.emulated else "device"
         self._taps = taps
-        self._started = False
+        self._started = self._failing = False
         self._changed: Callable[[], None] = lambda: None
-        self.emulator = EmulatorProcess() if options.emulated else None
+        self._let_go: Callable[[], None] = lambda: None
+        if options.emulated:
+            check_wishes(options.mode, options.rpm)  # before a process is started for them
+        self.emulator = EmulatorProcess(on_end=self._emulator_ended) if options.emulated else None
         try:
             self._driver = Driver(
                 self.emulator.port if self.emulator else options.port,
@@ -63,7 +69,9 @@ class LiveSource(Source):
                 rpm=options.rpm,
                 tap=self._tap,
                 on_change=lambda: self._changed(),
-            ).__enter__()
+            )
+            self._let_go = self._driver.close
+            self._driver.__enter__()
         except BaseException:
             self._end_emulator()
             raise
@@ -116,7 +124,7 @@ class LiveSource(Source):
     def holds(self, port: str | None) -> bool:
         """Whether opening that port (None: the only one connected) would find it taken by this source."""
         return self.kind == "device" and (
-            port is None or os.path.realpath(port) == os.path.realpath(self._driver.port)
+            port is None or os.path.realpath(path_of(port)) == os.path.realpath(self._driver.port)
         )
 
     def device(self) -> DeviceJson:
@@ -153,10 +161,20 @@ class LiveSource(Source):
                     self._kept.append((scan, revolution.arrival))
                     self._made += 1
                 arrived()
-                self._taps.scan(scan)
+                self._tell(scan)
         except DeviceError as error:
             self.error = str(error)
             self._changed()
+
+    def _tell(self, scan: Scan) -> None:
+        """What others make of a scan must not end the view; nor may a thousand failures fill the log."""
+        try:
+            self._taps.scan(scan)
+            self._failing = False
+        except Exception:
+            if not self._failing:
+                logger.exception("a scan could not be passed on")
+            self._failing = True
 
     def _tap(self, direction: Literal["in", "out"], time: float, data: bytes) -> None:
         """Only of the source that plays: another one may be tried meanwhile."""
@@ -170,6 +188,12 @@ class LiveSource(Source):
             place = index - (self._made - len(self._kept))
             return self._kept[place] if 0 <= place < len(self._kept) else None
 
+    def _emulator_ended(self) -> None:
+        """By itself; it does not come back, so there is nothing to reconnect to."""
+        self.error = "The emulator has ended: choose it again, and a new one starts."
+        self._let_go()
+        self._changed()
+
     def _end_emulator(self) -> None:
         if self.emulator:
             self.emulator.close()
@@ -182,7 +206,8 @@ def connected_or_emulated(options: DeviceOptions, taps: Taps) -> tuple[LiveSourc
     """
     if options.port is not None or options.emulated:
         source = LiveSource(options, taps)
-        return source, [_said(source)]
+        said = _said(source)
+        return source, [said[0].upper() + said[1:]]
     said = []
     for path in islice(_promising(), 8):
         try:

@@ -14,13 +14,14 @@ from serial.tools.list_ports import comports
 
 from lidarcore.errors import DeviceError, NoAnswerError
 from lidarcore.rplidar.connection.devices import find_other_baud, only_device
+from lidarcore.rplidar.connection.handshake import choose_mode
 from lidarcore.rplidar.connection.latest import Latest
 from lidarcore.rplidar.connection.leaving import close_on_leaving, leave_alone
 from lidarcore.rplidar.connection.port import Cancelled, ListPorts, Tap
 from lidarcore.rplidar.connection.returning import find_again
 from lidarcore.rplidar.connection.session import Session, Wishes
 from lidarcore.rplidar.connection.statistics import Statistics, Tally
-from lidarcore.rplidar.protocol import DeviceInfo, Health, Revolution, ScanMode
+from lidarcore.rplidar.protocol import S1_MODES, DeviceInfo, Health, Revolution, ScanMode
 from lidarcore.scan import Scan
 
 State = Literal["connecting", "streaming", "stalled", "reconnecting", "closed"]
@@ -39,7 +40,7 @@ class Driver:
             for scan in driver:
                 ...
 
-    port       its path; None takes the only one connected
+    port       its path, or its name in /dev; None takes the only one connected
     baud       256000 for an S1
     mode       "DenseBoost" or "Standard"; None takes what the sensor recommends
     rpm        480 to 900; None is 600
@@ -86,12 +87,13 @@ class Driver:
 
     def __enter__(self) -> Self:
         self._become("connecting")
+        close_on_leaving(self.close)
         try:
             self._session = self._connect_first(self._port or only_device(self._list_ports))
         except BaseException as error:
+            leave_alone(self.close)
             self._become("closed", str(error))
             raise
-        close_on_leaving(self.close)
         self._thread.start()
         return self
 
@@ -99,7 +101,10 @@ class Driver:
         self.close()
 
     def close(self) -> None:
-        """Stop the motor, let go of the port and end the iterators; from any thread, also more than once."""
+        """Stop the motor, let go of the port and end the iterators; from any thread, also more than once.
+
+        Entering that is still under way in another thread raises DeviceError soon.
+        """
         leave_alone(self.close)
         self._closing.set()
         self._revolutions.close()
@@ -175,11 +180,15 @@ class Driver:
 
     def _connect_first(self, path: str) -> Session:
         try:
-            return self._connect(path)
+            return self._connect_or_name_baud(path)
         except Cancelled:
             raise DeviceError("The driver was closed: make another one.") from None
+
+    def _connect_or_name_baud(self, path: str) -> Session:
+        try:
+            return self._connect(path)
         except NoAnswerError as error:
-            if (baud := find_other_baud(path, self.baud)) is None:
+            if (baud := find_other_baud(path, self.baud, self._closing)) is None:
                 raise
             raise NoAnswerError(
                 f"The sensor at {path} talks at {baud} baud, not at {self.baud}: choose that rate."
@@ -235,6 +244,12 @@ class Driver:
         self._state, self._error = state, error
         if self._on_change:
             self._on_change()
+
+
+def check_wishes(mode: str | None, rpm: int | None) -> None:
+    """Raises DeviceError for what no S1 can do, also not an emulated one; None is a wish that is always met."""
+    choose_mode(S1_MODES, None, mode)
+    _checked(RPM if rpm is None else rpm)
 
 
 def _checked(rpm: int) -> int:

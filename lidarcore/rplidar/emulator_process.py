@@ -4,7 +4,9 @@ import queue
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, Self
 
 from lidarcore.errors import DeviceError
@@ -19,14 +21,19 @@ _QUIT_TIME = 5.0  # s
 class EmulatorProcess:
     """An emulated S1 at `port`, with the options of EmulatorOptions; a context manager.
 
+    on_end  called, from a thread of its own, when the process ends without `close`; its port is gone by then
+
     Raises DeviceError if it does not come up, and pydantic's ValidationError for options that cannot be.
     """
 
-    def __init__(self, **options: Any) -> None:
-        arguments = EmulatorOptions(**options).arguments()
+    def __init__(self, *, on_end: Callable[[], None] | None = None, **options: Any) -> None:
+        chosen = EmulatorOptions(**options)
+        self._owns_folder = chosen.link is None
+        self._on_end = on_end
+        self._closing = threading.Event()
         # A session of its own: what a terminal interrupts is this process, which then ends the emulator.
         self._process = subprocess.Popen(
-            [sys.executable, "-m", _MODULE, *arguments],
+            [sys.executable, "-m", _MODULE, *chosen.arguments()],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -66,6 +73,7 @@ class EmulatorProcess:
     def close(self) -> None:
         """End it; if it has ended already, this does nothing."""
         assert self._process.stdin is not None
+        self._closing.set()
         with suppress(OSError):
             self._process.stdin.close()  # it quits at the end of its input
         try:
@@ -73,6 +81,8 @@ class EmulatorProcess:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        if self._reader is threading.current_thread():  # in `on_end`: nothing is read any more
+            return
         self._reader.join()
         for output in (self._process.stdout, self._process.stderr):
             assert output is not None
@@ -101,8 +111,23 @@ class EmulatorProcess:
         return line.rstrip("\n")
 
     def _read(self) -> None:
-        """Lines as they come, and an empty one at the end."""
+        """Lines as they come, and an empty one at the end; then see to what the process has left behind."""
         assert self._process.stdout is not None
+        first = self._process.stdout.readline()
+        self._lines.put(first)
         for line in self._process.stdout:
             self._lines.put(line)
+        killed = self._process.wait() != 0  # else it has cleared up itself
+        if killed and first.startswith(FIRST_LINE):
+            self._clear_up(Path(first.removeprefix(FIRST_LINE).rstrip("\n")))
         self._lines.put("")
+        if first and self._on_end and not self._closing.is_set():
+            self._on_end()
+
+    def _clear_up(self, link: Path) -> None:
+        """Remove the port, which may soon lead to another's terminal."""
+        with suppress(OSError):
+            link.unlink()
+        if self._owns_folder:
+            with suppress(OSError):
+                link.parent.rmdir()

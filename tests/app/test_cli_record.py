@@ -1,6 +1,8 @@
 """`lidarcore record` as a process of its own, on an emulated sensor."""
 
+import os
 import re
+import select
 import signal
 import subprocess
 import sys
@@ -18,6 +20,11 @@ def run(*arguments):
     return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, timeout=120)
 
 
+def start(*arguments):
+    command = [*COMMAND, *map(str, arguments)]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
 def test_it_records_for_a_while_and_says_how_much(tmp_path):
     output, raw = tmp_path / "a.mcap", tmp_path / "a.rplidar"
     done = run(output, "--emulator", "--duration", 2, "--raw", raw, "--set", "gap=0.3")
@@ -31,26 +38,69 @@ def test_it_records_for_a_while_and_says_how_much(tmp_path):
     assert sum(captured.get(round(scan.stamp, 2)) == len(scan) for scan in scans) >= len(scans) - 2
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_properly(tmp_path, number):
     output = tmp_path / "a.mcap"
     with EmulatorProcess() as emulator:
-        process = subprocess.Popen(
-            [*COMMAND, output, "--port", emulator.port], stdout=subprocess.PIPE, text=True
-        )
+        process = start(output, "--port", emulator.port)
         deadline = time.monotonic() + 60
         while not (output.exists() and output.stat().st_size):
             assert time.monotonic() < deadline
             assert process.poll() is None
             time.sleep(0.05)
         process.send_signal(number)
-        said, _ = process.communicate(timeout=20)
-    assert process.returncode == 0
+        said, complaint = process.communicate(timeout=20)
+    assert (process.returncode, complaint) == (0, "")
     recording = open_recording(output)
     count = len(list(recording))
     assert f"{count} scans" in said
     assert count > 0
     assert recording.notes == ()
+
+
+def test_a_signal_ends_waiting_for_an_answer_and_leaves_nothing(tmp_path):
+    far, near = os.openpty()
+    process = start(tmp_path / "a.mcap", "--port", os.ttyname(near))
+    assert select.select([far], [], [], 60)[0]  # it asks
+    process.terminate()
+    said, complaint = process.communicate(timeout=3)
+    assert (process.returncode, said) == (2, "")
+    assert complaint == "lidarcore: Nothing was recorded: no scan came.\n"
+    assert list(tmp_path.iterdir()) == []
+    for end in (far, near):
+        os.close(end)
+
+
+def test_under_nohup_a_hangup_is_ignored(tmp_path):
+    output = tmp_path / "a.mcap"
+    command = ["nohup", *COMMAND, output, "--emulator", "--duration", "2"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        deadline = time.monotonic() + 60
+        while not (output.exists() and output.stat().st_size):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        process.send_signal(signal.SIGHUP)
+        said, _ = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert open_recording(output).notes == ()
+    assert re.search(r"\d+ scans in [12]\.\d s", said)
+
+
+@pytest.mark.parametrize(
+    ("wish", "complaint"),
+    [
+        (["--duration", "inf"], "at most"),
+        (["--duration", "nan"], "0.1"),
+        (["--rpm", "60"], "choose 480 to 900"),
+        (["--mode", "Turbo", "--emulator"], "no mode Turbo: take Standard or DenseBoost"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_starts(tmp_path, wish, complaint):
+    done = run(tmp_path / "a.mcap", *wish)
+    assert done.returncode == 2
+    assert complaint in done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_existing_file_is_refused_before_anything_turns(tmp_path):

@@ -25,6 +25,7 @@ from lidarcore.rplidar.protocol import (
     Descriptor,
     DeviceInfo,
     StreamDecoder,
+    encode_nodes,
     request,
 )
 
@@ -190,3 +191,47 @@ def test_a_live_capture_holds_what_the_driver_gave(tmp_path):
         np.testing.assert_allclose(scan.beam_times, seen.beam_times, atol=1e-6)
         assert scan.stamp == pytest.approx(seen.stamp, abs=0.01)
         assert abs(scan.stamp - time.time()) < 60
+
+
+@pytest.mark.parametrize(
+    ("sensor", "wish", "name"),
+    [({}, "Standard", "Standard"), ({"legacy_only": True}, None, "Standard"), ({}, None, "DenseBoost")],
+    ids=["standard", "legacy", "dense"],
+)
+def test_replayed_through_the_driver_a_capture_gives_what_it_gives_from_the_file(
+    tmp_path, sensor, wish, name
+):
+    path = tmp_path / "a.rplidar"
+    with (
+        CaptureWriter(path) as capture,
+        EmulatorProcess(spin_up=0, **sensor) as emulator,
+        Driver(emulator.port, mode=wish, tap=capture.write) as driver,
+    ):
+        modes = driver.modes
+        for _ in islice(driver, 10):
+            pass
+    with EmulatorProcess(replay=path) as emulator, Driver(emulator.port) as driver:
+        replayed = list(islice(driver, 7))
+        told = driver.statistics
+        assert (driver.mode.name, driver.modes) == (name, modes)
+    assert told.rate_hz == pytest.approx(10, rel=0.05)
+    assert np.diff([scan.stamp for scan in replayed]) == pytest.approx(0.1, rel=0.1)
+    for scan, seen in zip(replayed, open_recording(path), strict=False):
+        np.testing.assert_array_equal(scan.ranges, seen.ranges)
+        np.testing.assert_allclose(scan.bearings, seen.bearings)
+        np.testing.assert_allclose(scan.beam_times, seen.beam_times, atol=1e-6)
+
+
+def test_a_capture_begun_amid_another_mode_than_the_usual_is_replayed_in_it(tmp_path):
+    """As the recorder writes it when it is started later than the sensor."""
+    nodes = np.arange(4000) * 360 * 10 * 244e-6 % 360
+    begins = np.diff(nodes, prepend=0) < 0
+    data = encode_nodes(nodes, np.full(4000, 2000.0), np.full(4000, 47), begins)
+    with CaptureWriter(tmp_path / "a.rplidar", Stream(Answer.NODES, 244.0)) as capture:
+        for at in range(0, 4000, 16):
+            capture.write("in", 1.7e9 + at * 244e-6, data[5 * at : 5 * (at + 16)])
+    with EmulatorProcess(replay=tmp_path / "a.rplidar") as emulator, Driver(emulator.port) as driver:
+        replayed = list(islice(driver, 5))
+        assert (driver.mode.name, driver.mode.us_per_sample) == ("Standard", 244)
+    assert np.diff([scan.stamp for scan in replayed]) == pytest.approx(0.1, rel=0.1)
+    assert np.array([np.ptp(scan.beam_times) for scan in replayed]) == pytest.approx(0.1, rel=0.02)

@@ -16,6 +16,7 @@ from serial import Serial
 
 from lidarcore.errors import DeviceError, NoAnswerError, NoDeviceError, PortBusyError
 from lidarcore.rplidar import Driver
+from lidarcore.rplidar.driver import check_wishes
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.rplidar.protocol import S1_MODES, StreamDecoder
 
@@ -218,6 +219,12 @@ def test_wishes_that_cannot_be_met_are_refused() -> None:
         Driver("/dev/ttyUSB0", rpm=60)
     with pytest.raises(NoDeviceError, match="no port /dev/ttyUSB99"):
         Driver("/dev/ttyUSB99").__enter__()
+    with pytest.raises(DeviceError, match="no mode Turbo: take Standard or DenseBoost"):
+        check_wishes("Turbo", None)
+    with pytest.raises(DeviceError, match="choose 480 to 900"):
+        check_wishes("DenseBoost", 901)
+    check_wishes(None, None)
+    check_wishes("standard", 480)
 
 
 def test_the_right_baud_rate_is_named_where_the_wrong_one_was_given(sensor: EmulatorProcess) -> None:

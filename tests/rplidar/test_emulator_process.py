@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import psutil
@@ -45,6 +46,39 @@ def test_it_takes_options_and_gives_the_port_at_the_path_asked_for(tmp_path):
         assert not psutil.pid_exists(emulator.pid)
         with pytest.raises(DeviceError, match="not running any more"):
             emulator.command("unplug")
+
+
+@pytest.mark.parametrize("options", [{}, {"link": "lidar"}], ids=["own folder", "link"])
+def test_killed_it_leaves_no_port_no_folder_and_no_zombie(tmp_path, options):
+    link = {name: tmp_path / path for name, path in options.items()}
+    ended = threading.Event()
+    with EmulatorProcess(on_end=ended.set, **link) as emulator:
+        os.kill(emulator.pid, signal.SIGKILL)
+        assert ended.wait(10)
+        assert not os.path.lexists(emulator.port)
+        assert Path(emulator.port).parent.exists() == bool(options)
+        assert not psutil.pid_exists(emulator.pid)
+        with pytest.raises(DeviceError, match="not running any more"):
+            emulator.command("unplug")
+
+
+def test_its_end_is_told_once_and_only_if_it_was_not_asked_for():
+    ends, ended = [], threading.Event()
+
+    def end():
+        emulator.close()  # which is allowed
+        ends.append(emulator.port)
+        ended.set()
+
+    with EmulatorProcess(on_end=end) as emulator:
+        emulator.command("quit")
+        assert ended.wait(10)
+    assert ends == [emulator.port]
+    with EmulatorProcess(on_end=lambda: ends.append("closed")):
+        pass
+    with pytest.raises(DeviceError, match="has ended"):
+        EmulatorProcess(on_end=lambda: ends.append("not begun"), replay="/nope")
+    assert ends == [emulator.port]
 
 
 def test_the_link_of_an_emulator_that_was_killed_is_taken_over(tmp_path):

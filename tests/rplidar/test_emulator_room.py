@@ -105,8 +105,13 @@ def test_a_capture_that_began_in_the_middle_of_a_scan_is_announced(tmp_path):
 
 def test_what_is_no_capture_is_refused(tmp_path, capsys):
     (tmp_path / "text").write_text("room\n")
-    for name, cause in (("text", "no capture"), ("nothing", "No such file")):
+    with CaptureWriter(tmp_path / "strange", Stream(0x07)) as capture:
+        capture.write("in", 0.0, b"?")
+    faults = {"text": "no capture", "nothing": "No such file", ".": "Is a directory", "strange": "type 7"}
+    for name, cause in faults.items():
         with pytest.raises(SystemExit) as ended:
             main([f"--replay={tmp_path / name}"])
         assert ended.value.code == 2
-        assert cause in capsys.readouterr().err
+        (sentence,) = capsys.readouterr().err.splitlines()
+        assert sentence.startswith("lidarcore: ")
+        assert cause in sentence

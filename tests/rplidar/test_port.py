@@ -58,6 +58,25 @@ def test_what_is_no_port(path: str) -> None:
         Port(path, 256_000)
 
 
+@pytest.mark.parametrize("path", ["/dev/tty\0USB0", "tty\0", "/dev/\ud800"])
+def test_what_is_no_text_is_no_port(path: str) -> None:
+    with pytest.raises(NoDeviceError, match="cannot be the path of a port") as raised:
+        Port(path, 256_000)
+    str(raised.value).encode()  # whoever shows it can
+
+
+def test_a_port_may_be_given_by_its_name(line: Line, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(NoDeviceError, match="/dev/null cannot be used"):
+        Port("null", 256_000)
+    with pytest.raises(NoDeviceError, match="no port /dev/ttyUSB99:"):
+        Port("ttyUSB99", 256_000)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lidar").symlink_to(line.path)
+    port = Port("lidar", 256_000)
+    assert port.path == "lidar"
+    port.close()
+
+
 def test_without_permission_the_group_to_join_is_named(line: Line) -> None:
     if os.getuid() == 0:
         os.chown(line.path, -1, grp.getgrnam("tty").gr_gid)

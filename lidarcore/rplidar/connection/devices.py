@@ -1,5 +1,6 @@
 """Which serial ports there are, and which of them an RPLIDAR is connected to."""
 
+import threading
 from contextlib import closing
 from dataclasses import dataclass, replace
 
@@ -64,9 +65,9 @@ def only_device(list_ports: ListPorts = comports) -> str:
     return devices[0].path
 
 
-def find_other_baud(path: str, baud: int) -> int | None:
-    """Another common baud rate than this at which an RPLIDAR answers there. Raises DeviceError."""
-    with closing(Port(path, baud)) as port:
+def find_other_baud(path: str, baud: int, cancelled: threading.Event) -> int | None:
+    """Another common baud rate than this at which an RPLIDAR answers there. Raises DeviceError and Cancelled."""
+    with closing(Port(path, baud, cancelled=cancelled)) as port:
         found = find_baud(port)
         return found[0] if found else None
 

@@ -6,6 +6,7 @@ dense capsule in 267 begins like a descriptor.
 
 import struct
 import time
+from dataclasses import replace
 
 from lidarcore.errors import DeviceError, NoAnswerError, ProtectionStopError
 from lidarcore.rplidar.connection.port import Port
@@ -86,6 +87,15 @@ def choose_mode(modes: tuple[ScanMode, ...], typical: int | None, name: str | No
         if mode.name.casefold() == name.casefold():
             return mode
     raise DeviceError(f"The sensor has no mode {name}: take {' or '.join(mode.name for mode in modes)}.")
+
+
+def mode_sending(answer: Answer, asked: ScanMode, modes: tuple[ScanMode, ...]) -> ScanMode:
+    """The mode that sends such answers: the one asked for, else one the sensor has, else one of an S1.
+
+    A sensor may start in another mode than asked, and does where a capture of one is replayed.
+    """
+    known = (mode for mode in (asked, *modes, *S1_MODES) if mode.answer_type == answer)
+    return next(known, replace(asked, answer_type=answer))
 
 
 def start(port: Port, mode: ScanMode) -> tuple[Answer, bytes]:

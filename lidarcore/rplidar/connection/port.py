@@ -50,7 +50,7 @@ class Port:
     def __init__(
         self, path: str, baud: int, tap: Tap | None = None, cancelled: threading.Event | None = None
     ) -> None:
-        self.path = path
+        self.path = path = path_of(path)
         self.baud = baud
         self._tap = tap
         self._tap_failure: Exception | None = None
@@ -124,6 +124,20 @@ class Port:
 
     def _unplugged(self) -> UnpluggedError:
         return UnpluggedError(f"{self.path} went away: check the sensor's cable and plug it in again.")
+
+
+def path_of(port: str) -> str:
+    """Path of a port that may be given by its mere name, such as ttyUSB0. Raises NoDeviceError for no text."""
+    try:
+        port.encode()
+    except UnicodeEncodeError:
+        is_text = False
+    else:
+        is_text = "\0" not in port
+    if not is_text:
+        raise NoDeviceError(f"{port!a} cannot be the path of a port: {ports_there_are()}")
+    is_name = os.name == "posix" and "/" not in port and not os.path.lexists(port)
+    return f"/dev/{port}" if is_name else port
 
 
 def holders(path: str) -> list[str]:

@@ -3,7 +3,7 @@
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from lidarcore.errors import DeviceError, NoAnswerError
 from lidarcore.rplidar.connection import handshake
@@ -39,12 +39,14 @@ class Session:
         self.info = handshake.identify(self.port)
         self.health = handshake.ensure_health(self.port)
         self.modes, typical = handshake.read_modes(self.port)
-        mode = handshake.choose_mode(self.modes, typical, wishes.mode)
-        answer, self._early = handshake.start(self.port, mode)
+        asked = handshake.choose_mode(self.modes, typical, wishes.mode)
+        answer, self._early = handshake.start(self.port, asked)
         # The sensor forgets a speed that was set before the scan began.
         handshake.set_speed(self.port, wishes.rpm)
-        self.mode = replace(mode, answer_type=answer)  # what comes counts, not what was announced
-        self.decoder = StreamDecoder(answer, mode.us_per_sample, wishes.baud)
+        self.mode = handshake.mode_sending(
+            answer, asked, self.modes
+        )  # what comes counts, not what was asked for
+        self.decoder = StreamDecoder(answer, self.mode.us_per_sample, wishes.baud)
         self._packets = 0
         self._last = time.monotonic()
 

@@ -21,7 +21,7 @@ class Statistics:
     reconnects     connections after the first
     rate_hz        revolutions a second, of the last 10; 0 while none arrive
     samples_per_s  of the last 10 revolutions; 0 while none arrive
-    completeness   share of the last 10 revolutions that arrived, 0 to 1
+    completeness   share of the last 10 revolutions that arrived, 0 to 1; 0 while none arrive
     """
 
     bytes: int = 0
@@ -55,7 +55,7 @@ class Tally:
 
     def statistics(self, overruns: int) -> Statistics:
         """As of now."""
-        total, recent = self._past + self._now, list(self._recent)
+        total, recent = self._past + self._now, self._fresh()
         rate, samples = _rates(recent)
         return Statistics(
             bytes=total.bytes,
@@ -69,10 +69,15 @@ class Tally:
             completeness=_completeness(recent[-RECENT:]),
         )
 
+    def _fresh(self) -> list[Revolution]:
+        """The last ones; none if none arrive any more."""
+        recent = list(self._recent)
+        return recent if recent and time.monotonic() - recent[-1].arrival <= STALE else []
+
 
 def _rates(recent: list[Revolution]) -> tuple[float, float]:
-    """Revolutions and samples a second; 0 if there are none now."""
-    if len(recent) < 2 or time.monotonic() - recent[-1].arrival > STALE:
+    """Revolutions and samples a second; 0 if that cannot be told."""
+    if len(recent) < 2:
         return 0.0, 0.0
     duration = float(recent[-1].times[0] - recent[0].times[0])
     if duration <= 0:

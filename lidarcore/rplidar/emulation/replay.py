@@ -3,17 +3,19 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from lidarcore.rplidar.capture import read_pieces, read_stream
-from lidarcore.rplidar.emulation.device import PACKET_SIZES, EmulatedS1
+from lidarcore.errors import RecordingError
+from lidarcore.rplidar.capture import Stream, read_pieces, read_stream
+from lidarcore.rplidar.decoding.packets import FORMATS
+from lidarcore.rplidar.emulation.device import EmulatedS1
 from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.rplidar.emulation.scan import Packet, Room
-from lidarcore.rplidar.protocol import Command, Descriptor, Request, RequestReader, ScanMode
+from lidarcore.rplidar.protocol import Answer, Command, Descriptor, Request, RequestReader, ScanMode
 
 _SCANS = (Command.SCAN, Command.FORCE_SCAN, Command.EXPRESS_SCAN)
 
 
 class Replay:
-    """What is in a capture. Raises RecordingError if the file is none.
+    """What is in a capture. Raises RecordingError if the file is none, or cannot be read.
 
     answers    bytes that came back on each request before the first scan
     announced  the capture has the beginning of the scan, with its descriptor
@@ -24,8 +26,7 @@ class Replay:
         self._path = path
         self.answers: dict[Request, bytes] = {}
         self.announced = False
-        with path.open("rb") as file:
-            self.stream = read_stream(file)
+        self.stream = _stream(path)
         asked = None
         for _, event in self._events():
             if isinstance(event, Request):
@@ -66,11 +67,27 @@ class ReplayedS1(EmulatedS1):
         super().__init__(options, room, now)
 
     def _tell(self, command: int, payload: bytes) -> bytes:
-        return self._replay.answers.get(Request(command, payload)) or super()._tell(command, payload)
+        question = Request(command, payload)
+        if question in self._replay.answers:  # maybe with nothing: old sensors do not know every question
+            return self._replay.answers[question]
+        return super()._tell(command, payload)
 
     def _scan(self, mode: ScanMode, now: float, *, wait: bool = True) -> bytes:
         self.play((now + time, data) for time, data in self._replay.measurements())
         if self._replay.announced:
             return b""
-        kind = self._replay.stream.answer_type or mode.answer_type
-        return Descriptor(kind, PACKET_SIZES[kind], repeated=True).encode()
+        kind = Answer(self._replay.stream.answer_type or mode.answer_type)
+        return Descriptor(kind, FORMATS[kind].size, repeated=True).encode()
+
+
+def _stream(path: Path) -> Stream:
+    try:
+        with path.open("rb") as file:
+            stream = read_stream(file)
+    except OSError as error:
+        raise RecordingError(
+            f"{path} cannot be replayed: {error.strerror}. Give a capture, as `lidarcore record --raw` writes it."
+        ) from error
+    if stream.answer_type not in (None, *FORMATS):
+        raise RecordingError(f"{path} cannot be replayed: there is no scan of type {stream.answer_type}.")
+    return stream
