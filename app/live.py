@@ -206,8 +206,8 @@ def connected_or_emulated(options: DeviceOptions, taps: Taps) -> tuple[LiveSourc
     """
     if options.port is not None or options.emulated:
         source = LiveSource(options, taps)
-        said = _said(source)
-        return source, [said[0].upper() + said[1:]]
+        sentence = _said(source)
+        return source, [sentence[0].upper() + sentence[1:]]
     said = []
     for path in islice(_promising(), 8):
         try:
