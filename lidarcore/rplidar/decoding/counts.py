@@ -15,7 +15,7 @@ class Counts:
     dropped      by reason, those that occurred:
                  garbage_bytes    bytes that belonged to no intact packet
                  damaged_packets  packets that were in their place, but their checksum or check bit was wrong
-                 missing_packets  capsules that never came, by the angle of the next one
+                 missing_packets  capsules that never came intact, damaged ones too, by angle and arrival of the next
                  unfit_packets    intact capsules and nodes whose angle does not fit those around
     partial_samples  of turns whose beginning is unknown, after a start or an interruption: left out
     """

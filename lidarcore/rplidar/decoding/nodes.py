@@ -22,7 +22,8 @@ GAP = 10 * DEGREE  # neighbours this far apart have lost what was between; angle
 OVERDUE = TURN + 20 * DEGREE  # a turn this far that no node has ended
 MOST_LOST = 150  # nodes in a row; after more, the next one may be in any later turn
 MOST_NODES = 8192  # in a turn that does not end, because the sensor does not
-CHUNK = 1024  # nodes looked at together
+CHUNK = 1024  # nodes looked at together, at most
+FEW = 64  # nodes that wait for more, unless one of them starts a turn
 LATE = 0.05  # s; after a gap, a node this late may be turns further than its angle says
 
 ANGLE, DISTANCE, QUALITY, START, INDEX, AFTER_LOSS = range(6)
@@ -62,7 +63,7 @@ DECODERS: dict[Answer, Callable[[bytes], Nodes]] = {Answer.NODES: _legacy, Answe
 class NodeSequence:
     """Takes packets of nodes, puts revolutions into `completed`; what comes before the first start is left out.
 
-    The newest node waits for the next one, which shows whether its angle leaps.
+    The newest node waits for the next one, which shows whether its angle leaps; a few wait for more, to save time.
     """
 
     def __init__(self, answer: Answer, clock: SampleClock, counts: Counts) -> None:
@@ -87,7 +88,7 @@ class NodeSequence:
     def add(self, skipped: int, data: bytes, arrival: float, behind: int) -> None:
         """The next packets, how many bytes before them belonged to none, how many bytes were found behind them."""
         nodes = self._decode(data)
-        lost = skipped // self._format.size * self._format.samples
+        lost = -(-skipped // self._format.size) * self._format.samples  # of one that lost bytes, less is left
         first = self._count + lost
         self._count = first + nodes.shape[1]
         nodes[INDEX] = np.arange(first, self._count)
@@ -105,6 +106,7 @@ class NodeSequence:
 
     def _cut(self, arrival: float) -> None:
         """Nobody knows how much was lost before the next node: it may be in any later turn."""
+        self._examine(arrival)
         self._finish(self._nodes.shape[1], arrival)
         self._clock.reset()
         self._waiting, self._at_front = 0, False
@@ -112,6 +114,11 @@ class NodeSequence:
     def _collect(self, nodes: Nodes, arrival: float) -> None:
         self._nodes = np.concatenate([self._nodes, nodes], 1)
         self._waiting += nodes.shape[1]
+        if self._waiting >= FEW or self._nodes[START, -self._waiting : -1].any():
+            self._examine(arrival)
+
+    def _examine(self, arrival: float) -> None:
+        """Do with the nodes that wait what is to be done."""
         self._leave_out_leaps()
         while (end := self._end_of_turn()) is not None:
             self._finish(end, arrival)

@@ -34,23 +34,22 @@ class Sweep(NamedTuple):
 class Turns:
     """Collects sweeps, puts revolutions into `completed`; what comes before the front is first passed is left out.
 
-    What lies between two sweeps is a gap, less than a turn wide. Holds less than two turns.
+    What lies between two sweeps is a gap. Turns of which nothing is there are left out. Holds less than two turns.
     """
 
     def __init__(self, decode: Decoder, samples: int, clock: SampleClock, counts: Counts) -> None:
         self._decode, self._samples, self._clock, self._counts = decode, samples, clock, counts
         self.completed: list[Revolution] = []
-        self._starts: list[
-            int
-        ] = []  # 1/256 degree in the present turn: negative if the sweep began in the one before
+        self._starts: list[int] = []  # 1/256 degree in the present turn: negative if begun in the one before
         self._sweeps: list[Sweep] = []
         self._begun = False
 
     def add(self, sweep: Sweep, arrival: float) -> None:
         """The next sweep, and when its end became known."""
-        start = sweep.start
-        if self._starts and start < self._starts[-1]:
-            start += TURN_Q8
+        start = self._start(sweep)
+        if start >= 2 * TURN_Q8:
+            self.cut(arrival)
+            start = sweep.start
         self._starts.append(start)
         self._sweeps.append(sweep)
         last = (start << 8) + (self._samples - 1) * ((sweep.width << 8) // self._samples)
@@ -62,6 +61,13 @@ class Turns:
             self._starts = [at - TURN_Q8 for at in compress(self._starts, beyond)]
             self._sweeps = list(compress(self._sweeps, beyond))
             self._begun = True
+
+    def _start(self, sweep: Sweep) -> int:
+        """1/256 degree in the present turn, of which its number says how many more have passed."""
+        if not self._sweeps:
+            return sweep.start
+        about = self._starts[-1] + (sweep.number - self._sweeps[-1].number) * sweep.width
+        return sweep.start + round((about - sweep.start) / TURN_Q8) * TURN_Q8
 
     def cut(self, arrival: float) -> None:
         """Turns may be missing here: what is there is a revolution, and what comes is another."""
