@@ -78,7 +78,7 @@ def test_after_a_lost_byte_nothing_is_where_it_was(emulator, line):
     line.scan()
     data = line.read(84 * 200)
     whole = [capsules(data[at : at + 84])[0][0] for at in range(len(data) - 84)]
-    assert not any(whole[::84][20:])
+    assert sum(whole[::84][20:]) < 18  # of 180; 84 lost bytes on, a few are back in their places
     assert 0.25 < sum(whole) / 200 < 0.6  # 0.99 to the power of 84 is 0.43
 
 
