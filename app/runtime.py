@@ -1,5 +1,6 @@
 """From scans to frames: newest scan first, one immutable settings object for each frame."""
 
+import gc
 import logging
 import threading
 import time
@@ -125,6 +126,8 @@ class Runtime:
             warm_up()
         except Exception:
             logger.exception("the kernels could not be compiled ahead; they will be when they are needed")
+        gc.collect()
+        gc.freeze()  # what is here by now stays: searching it again and again delays frames by up to 0.1 s
         self.ready = True
         self.player.start()
         self.announce()

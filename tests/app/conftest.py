@@ -6,9 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from serving import Server, write_room
+from processes import Serving
+from sensing import watch
+from serving import SINCE, Server, write_room
 
 from app.serve import listen
+from lidarcore.rplidar.emulator_process import EmulatorProcess
 
 
 @pytest.fixture
@@ -39,12 +42,18 @@ def room(folder: Path) -> Path:
     return write_room(folder / "room.npz")
 
 
+@pytest.fixture(scope="session")
+def background(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a server plays until it is told what to play: a recording outside of its folder."""
+    return write_room(tmp_path_factory.mktemp("background") / "background.npz", scans=100, since=SINCE)
+
+
 @pytest.fixture
-def make_server(folder: Path) -> Iterator[Callable[..., Server]]:
+def make_server(folder: Path, background: Path) -> Iterator[Callable[..., Server]]:
     with ExitStack() as stack:
 
         def make(**options: Any) -> Server:
-            server = Server(folder, **options)
+            server = Server(folder, **{"recording": background} | options)
             stack.callback(server.stop)
             return server
 
@@ -57,11 +66,40 @@ def server(make_server: Callable[..., Server]) -> Server:
 
 
 @pytest.fixture(scope="module")
-def shared_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def shared_server(tmp_path_factory: pytest.TempPathFactory, background: Path) -> Iterator[Server]:
     """One for all tests of a module that change nothing in it."""
     folder = tmp_path_factory.mktemp("shared") / "recordings"
     folder.mkdir()
     write_room(folder / "room.npz")
-    server = Server(folder)
+    server = Server(folder, recording=background)
     yield server
     server.stop()
+
+
+@pytest.fixture
+def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
+    """`lidarcore serve` with these arguments and a folder of recordings of its own."""
+    started: list[Serving] = []
+
+    def start(*arguments: object, **options: Any) -> Serving:
+        started.append(Serving(*arguments, "--recordings", tmp_path / "recordings", **options))
+        return started[-1]
+
+    yield start
+    for one in started:
+        one.process.kill()
+        one.process.communicate()
+
+
+@pytest.fixture(scope="module")
+def sensor() -> Iterator[EmulatorProcess]:
+    """A sensor at a port, with nobody about who would hide a wall."""
+    with EmulatorProcess(people=0) as emulator:
+        yield emulator
+
+
+@pytest.fixture
+def watching(server: Server, sensor: EmulatorProcess) -> Server:
+    """A server that plays the sensor."""
+    watch(server, sensor)
+    return server

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,6 +21,7 @@ from app.server import ServerOptions, create_app
 
 ROOT = Path(__file__).parents[2]
 CORNERS = np.array([[3.5, 2.2], [-2.5, 2.2], [-2.5, -1.8], [3.5, -1.8]])  # m, in the sensor frame
+SINCE = 1e9  # s: stamp of the first scan of what a server plays until it is told what to play
 Json = dict[str, Any]
 
 
@@ -65,10 +67,15 @@ class Server:
             return stream.frame(lambda frame: frame["sequence"] > newest["sequence"])
 
     def play(self, path: Path, **options: Any) -> Json:
-        """Put the file into the folder, play it from its first scan, and return the first frame of it."""
+        """Play that file of the folder from its first scan, and return the first frame of it."""
         with self.stream() as stream:
             self.change("PUT", "/source", {"kind": "recording", "name": path.name, **options})
-            return stream.frame(lambda frame: frame["source"]["kind"] == "recording")
+            return stream.frame(lambda frame: chosen(frame) and frame["source"]["kind"] == "recording")
+
+    def recordings(self) -> list[Json]:
+        """The entries of what is in the folder: without what comes along, or was given at the start."""
+        names = {path.name for path in self.folder.iterdir()}
+        return [entry for entry in self.get("/recordings")["recordings"] if entry["name"] in names]
 
 
 class Stream:
@@ -93,6 +100,19 @@ class Stream:
         return self.until("state", holds)
 
 
+def chosen(frame: Json) -> bool:
+    """The scan is not of the recording that a server plays until it is told what to play."""
+    return not SINCE <= frame["stamp"] < SINCE + 100
+
+
+def wait_until(holds: Callable[[], object], seconds: float = 20) -> None:
+    """For what no event tells of, such as what is on the disk."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not come true"
+        time.sleep(0.01)
+
+
 def strict_json(text: str | bytes) -> Any:
     """JSON without the NaN and Infinity that Python would let pass."""
 
@@ -110,13 +130,15 @@ def room_ranges(bearings: np.ndarray) -> np.ndarray:
         return np.minimum(np.maximum(x_high / c, x_low / c), np.maximum(y_high / s, y_low / s))
 
 
-def write_room(path: Path, scans: int = 30, period: float = 0.1, noise: float = 0.005) -> Path:
+def write_room(
+    path: Path, scans: int = 30, period: float = 0.1, noise: float = 0.005, since: float = 100.0
+) -> Path:
     """A recording of a sensor that stands still in that room."""
     rng = np.random.default_rng(1)
     bearings = np.linspace(-np.pi, np.pi, 720, endpoint=False)
     ranges = room_ranges(bearings) + rng.normal(0, noise, (scans, len(bearings)))
     with path.open("wb") as file:
-        np.savez(file, ranges=ranges, bearings=bearings, stamps=100 + period * np.arange(scans))
+        np.savez(file, ranges=ranges, bearings=bearings, stamps=since + period * np.arange(scans))
     return path
 
 

@@ -1,17 +1,21 @@
 import re
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 import httpx
 import pytest
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 from serving import Json, Server, strict_json
 
 import lidarcore
 from app.api.meta import HealthJson, MethodsJson, VersionJson
 from app.api.recordings import RecordingsJson
 from app.api.selection import Selection
+from app.api.sensor import FoundDeviceJson
 from app.library import RecordingJson
 from app.player import SourceJson
+from app.recorder import RecorderJson
 from app.settings import Settings
 from app.wire import CornerJson, FrameJson, SegmentJson
 
@@ -28,6 +32,12 @@ TYPES = {
     ("get", "/recordings"): RecordingsJson,
     ("put", "/recordings/{name}"): RecordingJson,
     ("delete", "/recordings/{name}"): None,
+    ("get", "/devices"): list[FoundDeviceJson],
+    ("post", "/emulator"): None,
+    ("get", "/recorder"): RecorderJson,
+    ("post", "/recorder/start"): RecorderJson,
+    ("post", "/recorder/stop"): RecorderJson,
+    ("get", "/metrics"): None,
     ("get", "/source"): SourceJson,
     ("put", "/source"): SourceJson,
     ("patch", "/source"): SourceJson,
@@ -58,6 +68,16 @@ def test_every_route_is_documented_in_words(document: Json) -> None:
         assert operation["tags"]
 
 
+def validate(adapter: TypeAdapter[Any], example: Json) -> None:
+    """The example, with the nulls that FastAPI leaves out where a field is missing."""
+    try:
+        adapter.validate_python(example)
+    except ValidationError as error:
+        for *path, name in [e["loc"] for e in error.errors() if e["type"] == "missing"]:
+            reduce(getitem, path, example)[name] = None
+        adapter.validate_python(example)
+
+
 def test_every_answer_has_an_example_that_is_what_its_schema_says(document: Json) -> None:
     for route, type_ in TYPES.items():
         if type_ is None:
@@ -66,18 +86,26 @@ def test_every_answer_has_an_example_that_is_what_its_schema_says(document: Json
             a for status, a in operations(document)[route]["responses"].items() if status.startswith("2")
         ]
         example = answers[0]["content"]["application/json"]["example"]
-        TypeAdapter(type_).validate_python(example)
+        validate(TypeAdapter(type_), example)
 
 
-def test_every_body_has_an_example_that_the_route_takes(shared_server: Server, document: Json) -> None:
+# What the examples name and is not there: a sensor, a recording, a corner. And one recording at a time is recorded.
+IN_VAIN = {("/source", 404), ("/selection", 404), ("/recorder/start", 409)}
+
+
+def test_every_body_has_an_example_that_the_route_takes(server: Server, document: Json) -> None:
+    answers = set()
     for (method, path), operation in operations(document).items():
         for content in operation.get("requestBody", {}).get("content", {}).values():
             if path == "/recordings/{name}":
                 continue
             assert content["schema"]["examples"]
             for example in content["schema"]["examples"]:
-                status = shared_server.http.request(method, path, json=example).status_code
-                assert status in (200, 404), (path, example)  # 404: no such recording or corner here
+                here = example | {"port": "/dev/nothing"} if "port" in example else example
+                status = server.http.request(method, path, json=here).status_code
+                assert status in (200, 204) or (path, status) in IN_VAIN, (path, example)
+                answers.add((path, status))
+    assert {("/source", 200), ("/emulator", 204), ("/recorder/start", 200)} < answers
 
 
 def test_every_error_is_documented_as_a_problem(document: Json) -> None:

@@ -1,13 +1,12 @@
 import http.client
 import pickle
 import socket
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from serving import Server, assert_problem, write_room
+from serving import Server, assert_problem, chosen, wait_until, write_room
 
 BAD_NAMES = [
     "../up.npz", "%2e%2e%2fup.npz", "..%5cup.npz", "a%2fb.npz", "%2fetc%2fup.npz", ".hidden", "..", "%2e%2e",
@@ -25,12 +24,13 @@ def test_an_uploaded_recording_is_listed_plays_and_can_be_deleted(server: Server
     response = server.http.put("/recordings/my room.npz", content=source.read_bytes())
     assert response.status_code == 201
     entry = response.json()
-    assert entry == server.get("/recordings")["recordings"][0]
-    assert (entry["name"], entry["size"]) == ("my room.npz", source.stat().st_size)
+    assert server.recordings() == [entry]
+    assert (entry["name"], entry["size"], entry["builtin"]) == ("my room.npz", source.stat().st_size, False)
     assert (server.folder / "my room.npz").read_bytes() == source.read_bytes()
-    assert server.play(server.folder / "my room.npz")["source"]["kind"] == "recording"
+    assert server.play(server.folder / "my room.npz")["stamp"] == 100
+    assert server.get("/source")["recording"] == "my room.npz"
     assert server.http.delete("/recordings/my room.npz").status_code == 204
-    assert server.get("/recordings")["recordings"] == []
+    assert server.recordings() == []
     assert_problem(server.http.delete("/recordings/my room.npz"), 404)
 
 
@@ -98,7 +98,7 @@ def test_what_no_reader_takes_is_refused_with_its_reason_and_leaves_nothing(
     assert files(server.folder) == ["recordings"]
     assert not Path("pwned").exists()
     after = server.next_frame()
-    assert after["source"]["kind"] == "emulator"
+    assert not chosen(after)
     assert after["sequence"] > before["sequence"]
 
 
@@ -123,16 +123,8 @@ def test_an_upload_that_breaks_off_leaves_nothing(server: Server, room: Path) ->
     with socket.create_connection(("127.0.0.1", server.port)) as connection:
         head = f"PUT /api/v1/recordings/half.npz HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
         connection.sendall(f"{head}Content-Length: 1000000\r\n\r\n".encode() + room.read_bytes()[:100_000])
-        wait_for(lambda: files(server.folder) != before)
-    wait_for(lambda: files(server.folder) == before)
-
-
-def wait_for(holds: Callable[[], bool], seconds: float = 10) -> None:
-    """For what no event tells of: what is on the disk."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
+        wait_until(lambda: files(server.folder) != before)
+    wait_until(lambda: files(server.folder) == before)
 
 
 def test_a_recording_given_at_the_start_plays_and_is_listed_but_not_deleted(
@@ -140,13 +132,19 @@ def test_a_recording_given_at_the_start_plays_and_is_listed_but_not_deleted(
 ) -> None:
     given = write_room(tmp_path / "elsewhere.npz")
     server = make_server(recording=given)
-    assert server.next_frame()["source"]["kind"] == "recording"
-    assert [r["name"] for r in server.get("/recordings")["recordings"]] == ["elsewhere.npz"]
+    assert server.next_frame()["stamp"] < 200
+    assert [r["name"] for r in server.get("/recordings")["recordings"] if not r["builtin"]] == [
+        "elsewhere.npz"
+    ]
     assert_problem(server.http.delete("/recordings/elsewhere.npz"), 409)
     assert_problem(server.http.put("/recordings/elsewhere.npz?overwrite=1", content=given.read_bytes()), 409)
     assert given.exists()
-    server.change("PUT", "/source", {"kind": "emulator"})
-    assert server.play(given)["source"]["kind"] == "recording"
+    write_room(server.folder / "other.npz", since=500)
+    assert server.play(server.folder / "other.npz", paused=True)["stamp"]
+    assert server.get("/source")["recording"] == "other.npz"
+    server.change("PUT", "/source", {"kind": "recording", "name": given.name})
+    assert server.get("/source")["recording"] == given.name
+    assert server.next_frame()["stamp"] < 200
 
 
 def test_hidden_files_and_other_folders_are_not_listed_but_bags_are(server: Server, room: Path) -> None:
@@ -155,7 +153,7 @@ def test_hidden_files_and_other_folders_are_not_listed_but_bags_are(server: Serv
     bag = server.folder / "bag"
     bag.mkdir()
     (bag / "bag_0.db3").write_bytes(b"SQLite format 3\0")
-    assert [r["name"] for r in server.get("/recordings")["recordings"]] == ["bag", "room.npz"]
+    assert [r["name"] for r in server.recordings()] == ["bag", "room.npz"]
     assert server.http.delete("/recordings/bag").status_code == 204
     assert_problem(server.http.delete("/recordings/folder"), 404)
     assert (server.folder / "folder").is_dir()

@@ -16,6 +16,9 @@ MUTATIONS = [
     ("PATCH", "/source", {"loop": False}),
     ("POST", "/source/step", {"by": 1}),
     ("PUT", "/selection", {"corner": None}),
+    ("POST", "/recorder/start", {}),
+    ("POST", "/recorder/stop", None),
+    ("POST", "/emulator", {"command": "unplug"}),
     ("PUT", "/recordings/new.npz", {}),
     ("DELETE", "/recordings/room.npz", None),
 ]
@@ -32,7 +35,9 @@ def test_a_page_of_another_origin_changes_nothing(
         response = shared_server.http.request(method, path, json=body, headers=headers)
         assert_problem(response, 403)
     assert shared_server.get("/settings")["view"]["rotate"] is False
-    assert [r["name"] for r in shared_server.get("/recordings")["recordings"]] == ["room.npz"]
+    assert [r["name"] for r in shared_server.recordings()] == ["room.npz"]
+    assert shared_server.get("/source")["kind"] == "recording"
+    assert shared_server.get("/recorder")["state"] == "idle"
 
 
 def test_every_mutating_route_is_covered_by_these_tests(shared_server: Server) -> None:
@@ -88,14 +93,14 @@ def test_names_allowed_at_the_start_are_served(make_server: Callable[..., Server
 
 
 @pytest.fixture(scope="module")
-def guarded(tmp_path_factory: pytest.TempPathFactory) -> Server:
-    server = Server(tmp_path_factory.mktemp("guarded"), token=TOKEN)
+def guarded(tmp_path_factory: pytest.TempPathFactory, background: Path) -> Server:
+    server = Server(tmp_path_factory.mktemp("guarded"), recording=background, token=TOKEN)
     yield server
     server.stop()
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/docs", "/openapi.json", "/static/viser_bridge.js", "/viser/", "/api/v1/frame"]
+    "path", ["/", "/docs", "/openapi.json", "/static/viser_bridge.js", "/viser/", "/metrics", "/api/v1/frame"]
 )
 def test_without_the_token_there_is_nothing_to_see(guarded: Server, path: str) -> None:
     for headers in (

@@ -1,7 +1,7 @@
 from pathlib import Path
 
 import pytest
-from serving import Json, Server, assert_problem
+from serving import Json, Server, assert_problem, chosen
 
 
 def corner_ids(frame: Json) -> set[int]:
@@ -24,7 +24,7 @@ def test_a_selected_corner_is_marked_in_the_frames_and_told_to_all(server: Serve
 def test_while_paused_the_mark_appears_as_well(server: Server, room: Path) -> None:
     with server.stream() as stream:
         server.change("PUT", "/source", {"kind": "recording", "name": room.name, "paused": True})
-        frame = stream.frame(lambda f: f["source"]["kind"] == "recording")
+        frame = stream.frame(chosen)
         server.change("PUT", "/selection", {"corner": frame["corners"][0]["id"]})
         marked = stream.frame(lambda f: any(c["selected"] for c in f["corners"]))
     assert marked["source"]["index"] == frame["source"]["index"] == 0
@@ -34,7 +34,7 @@ def test_while_paused_the_mark_appears_as_well(server: Server, room: Path) -> No
 def test_corners_keep_their_ids_from_frame_to_frame(server: Server, room: Path) -> None:
     with server.stream() as stream:
         server.change("PUT", "/source", {"kind": "recording", "name": room.name})
-        frames = [stream.frame(lambda f: f["source"]["kind"] == "recording") for _ in range(10)]
+        frames = [stream.frame(chosen) for _ in range(10)]
     assert len(corner_ids(frames[0])) == 4
     assert all(corner_ids(frame) == corner_ids(frames[0]) for frame in frames)
 

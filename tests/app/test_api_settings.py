@@ -2,7 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
-from serving import Server, assert_problem
+from serving import Server, assert_problem, chosen
 
 from app.settings import Settings
 
@@ -38,7 +38,7 @@ def test_a_method_switched_is_in_the_next_frames(server: Server) -> None:
 def test_while_paused_the_current_scan_is_processed_again(server: Server, room: Path) -> None:
     with server.stream() as stream:
         server.change("PUT", "/source", {"kind": "recording", "name": room.name, "index": 3, "paused": True})
-        paused = stream.frame(lambda f: f["source"]["kind"] == "recording")
+        paused = stream.frame(chosen)
         server.change("PATCH", "/settings", {"extraction": {"min_length": 4.5}})
         again = stream.frame(lambda f: f["sequence"] > paused["sequence"])
     assert again["source"]["index"] == paused["source"]["index"] == 3

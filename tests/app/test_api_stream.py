@@ -25,14 +25,15 @@ def test_first_comes_the_state_then_the_newest_frame(server: Server) -> None:
     with server.stream() as stream:
         state, frame = stream.message(), stream.message()
     assert state["type"] == "state"
-    assert state.keys() == {"type", "settings", "source", "selection", "ready"}
+    assert state.keys() == {"type", "settings", "source", "selection", "recorder", "ready"}
     assert state["settings"] == server.get("/settings")
     assert state["source"].keys() == server.get("/source").keys()
+    assert state["recorder"] == server.get("/recorder")
     assert frame["type"] == "frame"
     assert frame.keys() - {"type", "points"} == server.get("/frame").keys()
 
 
-def test_every_change_is_told_to_every_client(server: Server) -> None:
+def test_every_change_is_told_to_every_client(server: Server, room: Path) -> None:
     with server.stream() as one, server.stream() as other:
         for method, path, body, holds in [
             (
@@ -43,7 +44,12 @@ def test_every_change_is_told_to_every_client(server: Server) -> None:
             ),
             ("PATCH", "/source", {"speed": 2}, lambda s: s["source"]["speed"] == 2),
             ("PATCH", "/source", {"state": "paused"}, lambda s: s["source"]["state"] == "paused"),
-            ("PUT", "/source", {"kind": "emulator"}, lambda s: s["source"]["state"] == "playing"),
+            (
+                "PUT",
+                "/source",
+                {"kind": "recording", "name": "room.npz"},
+                lambda s: s["source"]["state"] == "playing",
+            ),
         ]:
             server.change(method, path, body)
             assert one.state(holds)
@@ -56,12 +62,14 @@ def test_a_mailbox_holds_one_frame_the_newest() -> None:
             self.text = json.dumps({"n": n})
 
     async def scenario() -> None:
-        mailbox = Mailbox(points=False)
-        for n in range(5):
-            mailbox.put_frame(Frame(n))
+        mailbox, frames = Mailbox(points=False), [Frame(n) for n in range(5)]
+        for frame in frames:
+            mailbox.put_frame(frame)
         mailbox.put_state()
         mailbox.put_state()
-        assert await mailbox.take(lambda: "state") == ["state", '{"type":"frame","n": 4}']
+        messages, frame = await mailbox.take(lambda: "state")
+        assert messages == ["state", '{"type":"frame","n": 4}']
+        assert frame is frames[4]
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(mailbox.take(lambda: "state"), 0.05)
 
@@ -109,9 +117,19 @@ def test_twenty_clients_get_every_frame_in_order_and_memory_does_not_grow(
     tmp_path: Path, free_port: Callable[[], int]
 ) -> None:
     """In a process of its own, whose memory is its own."""
-    write_room(tmp_path / "room.npz")
+    room = write_room(tmp_path / "room.npz")
     port = free_port()
-    command = [sys.executable, "-m", "app.cli", "serve", "--port", str(port), "--recordings", str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "app.cli",
+        "serve",
+        room,
+        "--http-port",
+        str(port),
+        "--recordings",
+        tmp_path,
+    ]
     environment = os.environ | {"PYTHONUNBUFFERED": "1"}
     with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE) as process:
         try:

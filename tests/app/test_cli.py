@@ -2,11 +2,7 @@
 
 import csv
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,27 +11,11 @@ import httpx
 import numpy as np
 import pyarrow.parquet
 import pytest
-from serving import ROOT, write_room
+from processes import Serving, assert_refused, run
+from serving import write_room
 
 from app.serve import listen
 from lidarcore import ExtractionSettings, compare, open_recording
-
-ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.startswith("LIDARCORE")}
-
-
-def run(*arguments: object, timeout: float = 120) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "app.cli", *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
-
-
-def assert_refused(result: subprocess.CompletedProcess[str], *words: str) -> None:
-    """Exit code 2 and one sentence that has these words."""
-    assert result.returncode == 2, result
-    assert result.stdout == ""
-    assert result.stderr.startswith("lidarcore: ")
-    assert len(result.stderr.strip().splitlines()) == 1
-    for word in words:
-        assert word in result.stderr
 
 
 def test_help_is_instant_and_names_every_command() -> None:
@@ -179,51 +159,16 @@ def test_settings_come_from_a_file_and_from_the_line(tmp_path: Path) -> None:
     assert_refused(run("process", room, "-o", output, "--settings", tmp_path / "none.json"), "none.json")
 
 
-class Serving:
-    """`lidarcore serve` in a process of its own."""
-
-    def __init__(self, *arguments: object) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "app.cli", "serve", *map(str, arguments)],
-            cwd=ROOT, env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        line = self.process.stdout.readline()
-        match = re.search(r"http://\S+", line)
-        assert match, self.process.communicate()
-        self.url = match[0]
-
-    def interrupt(self) -> tuple[float, str]:
-        """Press Ctrl-C; how long it takes to end, and what it says about it."""
-        started = time.perf_counter()
-        self.process.send_signal(signal.SIGINT)
-        _, said = self.process.communicate(timeout=20)
-        return time.perf_counter() - started, said
-
-
-@pytest.fixture
-def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
-    started: list[Serving] = []
-
-    def start(*arguments: object) -> Serving:
-        started.append(Serving(*arguments, "--recordings", tmp_path / "recordings"))
-        return started[-1]
-
-    yield start
-    for one in started:
-        one.process.kill()
-        one.process.communicate()
-
-
 def test_serve_prints_its_address_plays_the_recording_and_ends_on_ctrl_c(
     tmp_path: Path, serving: Callable[..., Serving]
 ) -> None:
     room = write_room(tmp_path / "given.npz")
-    server = serving(room, "--port", 0, "--set", "fitter=cwlf")
+    server = serving("--http-port", 0, room, "--set", "fitter=cwlf")
     assert re.fullmatch(r"http://127\.0\.0\.1:[1-9]\d*/", server.url)
     with httpx.Client(base_url=f"{server.url}api/v1", timeout=60) as http:
         assert http.get("/source").json()["recording"] == "given.npz"
         assert http.get("/settings").json()["extraction"]["fitter"] == "cwlf"
-    seconds, said = server.interrupt()
+    seconds, said = server.end()
     assert seconds < 3
     assert said == ""
     assert server.process.returncode == 0
@@ -232,7 +177,7 @@ def test_serve_prints_its_address_plays_the_recording_and_ends_on_ctrl_c(
 def test_a_busy_port_is_said_to_be(serving: Callable[..., Serving], free_port: Callable[[], int]) -> None:
     with listen("127.0.0.1", 0) as listening:
         port = listening.getsockname()[1]
-        assert_refused(run("serve", "--port", port), str(port), "in use", "--port")
+        assert_refused(run("serve", "--port", port), str(port), "in use", f"--http-port {port + 1}")
     assert_refused(run("serve", "--host", "203.0.113.1"), "203.0.113.1")
     assert_refused(run("serve", "--host", "no.such.host.invalid"), "no.such.host.invalid")
 
@@ -243,16 +188,16 @@ def test_what_cannot_be_served_is_said_before_anything_listens(tmp_path: Path) -
     assert_refused(run("serve", "--port", 0, tmp_path / "empty.bag"), "empty")
 
 
-def test_beyond_this_machine_a_token_is_demanded(serving: Callable[..., Serving]) -> None:
-    server = serving("--port", 0, "--host", "0.0.0.0")
+def test_beyond_this_machine_a_token_is_demanded(serving: Callable[..., Serving], background: Path) -> None:
+    server = serving(background, "--port", 0, "--host", "0.0.0.0")
     port, token = re.fullmatch(r"http://[^/]+:(\d+)/\?token=(\S{20,})", server.url).groups()
     url = f"http://127.0.0.1:{port}/api/v1/health"
     assert httpx.get(url, timeout=60).status_code == 401
     assert httpx.get(url, headers={"authorization": f"Bearer {token}"}).status_code == 200
 
 
-def test_a_token_of_ones_own_is_demanded_anywhere(serving: Callable[..., Serving]) -> None:
-    server = serving("--port", 0, "--token", "my-token")
+def test_a_token_of_ones_own_is_demanded_anywhere(serving: Callable[..., Serving], background: Path) -> None:
+    server = serving(background, "--port", 0, "--token", "my-token")
     assert server.url.endswith("/?token=my-token")
     with httpx.Client(timeout=60, follow_redirects=True) as browser:
         assert browser.get(server.url.partition("?")[0]).status_code == 401
