@@ -28,7 +28,7 @@ export function makeChart({ series, log, text }, data, box, onCursor) {
         ...quiet,
         size: 52,
         values: (_, ticks) => ticks.map(text),
-        ...(log ? { splits: powers } : { incrs: COUNTS }),
+        ...(log ? { splits: powers, filter: everyTick } : { incrs: COUNTS }),
       },
     ],
     series: [
@@ -63,6 +63,9 @@ function decades(_, low, high) {
   const exponent = (value, round) => 10 ** round(Math.log10(value));
   return low > 0 ? [exponent(low, Math.floor), exponent(high * 1.001, Math.ceil)] : [1, 10];
 }
+
+/** uPlot would label only some powers of ten where they lie close. */
+const everyTick = (_, ticks) => ticks;
 
 /** Ticks at the powers of ten only. */
 function powers(_, axis, low, high) {

@@ -2,24 +2,57 @@
 
 import { $, el, remake, setText } from "./dom.js";
 import { quantile } from "./history.js";
+import { isStale } from "./live.js";
 import { open, transport } from "./session.js";
 import { get, on } from "./store.js";
-import { bytes, degrees, fixed, milliseconds, percent, wholeNumber } from "./units.js";
+import { bytes, COMPLETE_HINT, degrees, fixed, milliseconds, percent, UNKNOWN, wholeNumber } from "./units.js";
 
 const SLOWEST_RPM = 480;
 const FASTEST_RPM = 900;
 
+const LATENCY_HINT = "From the last byte of a revolution to sending it to this page, over the last half minute";
+
+/** What was counted, or (`now`) what comes at present, which is not known when nothing comes. */
 const FIGURES = [
-  { key: "rate", label: "Scans", text: ({ rate_hz }) => `${fixed(rate_hz, 1)}\u2009/s` },
-  { key: "samples", label: "Samples", text: ({ samples_per_s }) => `${wholeNumber(samples_per_s)}\u2009/s` },
-  { key: "completeness", label: "Complete", text: ({ completeness }) => percent(completeness) },
-  { key: "latency", label: "Latency, median", text: () => latency(0.5) },
-  { key: "latency-99", label: "Latency, 99 %", text: () => latency(0.99) },
+  { key: "rate", label: "Scans", now: true, text: ({ rate_hz }) => `${fixed(rate_hz, 1)}\u2009/s` },
+  {
+    key: "samples",
+    label: "Samples",
+    now: true,
+    text: ({ samples_per_s }) => `${wholeNumber(samples_per_s)}\u2009/s`,
+  },
+  {
+    key: "completeness",
+    label: "Complete",
+    hint: COMPLETE_HINT,
+    now: true,
+    text: ({ completeness }) => percent(completeness),
+  },
+  { key: "latency", label: "Latency, median", hint: LATENCY_HINT, now: true, text: () => latency(0.5) },
+  { key: "latency-99", label: "Latency, 99 %", hint: LATENCY_HINT, now: true, text: () => latency(0.99) },
   { key: "revolutions", label: "Revolutions", text: ({ revolutions }) => wholeNumber(revolutions) },
   { key: "bytes", label: "Received", text: (device) => bytes(device.bytes) },
-  { key: "reconnects", label: "Reconnects", text: ({ reconnects }) => reconnects },
-  { key: "overruns", label: "Overruns", text: ({ overruns }) => overruns },
+  {
+    key: "reconnects",
+    label: "Reconnects",
+    hint: "Connections to the sensor after the first",
+    text: ({ reconnects }) => reconnects,
+  },
+  {
+    key: "overruns",
+    label: "Overruns",
+    hint: "Revolutions that arrived, but the server was too busy to take them",
+    text: ({ overruns }) => overruns,
+  },
 ];
+
+/** Why the decoder left something out, by the reasons the server counts. */
+const LOSSES = {
+  missing_packets: "Packets that never came, by the angle of the next one",
+  damaged_packets: "Packets that came with a wrong checksum",
+  unfit_packets: "Intact packets whose angle does not fit those around, as while the motor changes its speed",
+  garbage_bytes: "Bytes between packets that belong to none",
+};
 
 const FACTS = [
   { label: "Port", text: ({ port }) => port },
@@ -45,7 +78,7 @@ const rpm = el("input", {
 export function mountDevice() {
   mode.addEventListener("change", changeMode);
   rpm.addEventListener("change", () => rpm.reportValidity() && transport.patch({ rpm: Number(rpm.value) }));
-  const figures = FIGURES.map(({ key, label }) => pair(label, el("dd", { id: `device-${key}` })));
+  const figures = FIGURES.map(({ key, label, hint }) => pair(label, el("dd", { id: `device-${key}` }), hint));
   $("device").append(
     el("dl", { class: "figures" }, ...figures),
     el("dl", { class: "losses", id: "device-losses" }),
@@ -59,26 +92,31 @@ export function mountDevice() {
     ),
     el("dl", { class: "facts", id: "device-facts" }),
   );
-  on(["source"], draw);
+  on(["source", "connection"], draw);
 }
 
-const pair = (label, value) => el("div", {}, el("dt", {}, label), value);
-const line = (label, text) => pair(label, el("dd", { title: String(text) }, String(text)));
+const pair = (label, value, hint = "") => el("div", { title: hint }, el("dt", {}, label), value);
+const line = (label, text, hint = String(text)) => pair(label, el("dd", {}, String(text)), hint);
 
-function draw({ device }) {
+function draw({ device }, connection) {
   $("device").hidden = !device;
   if (!device) return;
-  for (const { key, text } of FIGURES) setText($(`device-${key}`), text(device));
+  const stale = isStale({ device }, connection);
+  $("device").classList.toggle("stale", stale);
+  for (const { key, now, text } of FIGURES)
+    setText($(`device-${key}`), stale && now ? UNKNOWN : text(device));
   const losses = Object.entries(device.dropped);
   const lost = lostText(get("frame")?.gaps ?? []);
   remake($("device-losses"), [losses, lost], () => [
-    ...losses.map(([reason, count]) => line(`Dropped, ${reason.replaceAll("_", " ")}`, wholeNumber(count))),
-    line("Lost in this scan", lost),
+    ...losses.map(([reason, count]) =>
+      line(`Dropped, ${reason.replaceAll("_", " ")}`, wholeNumber(count), LOSSES[reason]),
+    ),
+    line("Lost in this scan", lost, "Sectors of the turn shown from which nothing arrived"),
   ]);
   remake(
     $("device-facts"),
     FACTS.map(({ text }) => text(device)),
-    () => FACTS.map(({ label, text }) => line(label, text(device) ?? "\u2013")),
+    () => FACTS.map(({ label, text }) => line(label, text(device) ?? UNKNOWN)),
   );
   remake(mode, [device.modes, device.mode], () =>
     device.modes.map((name) => el("option", { value: name, selected: name === device.mode }, name)),

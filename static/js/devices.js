@@ -21,7 +21,7 @@ export function mountDevices() {
 async function refresh() {
   const section = $("devices");
   section.setAttribute("aria-busy", "true");
-  const devices = await attempt(() => request("GET", "devices"));
+  const devices = await attempt(() => request("GET", "devices"), "The devices could not be listed");
   section.setAttribute("aria-busy", "false");
   if (devices) set("devices", devices);
 }

@@ -1,20 +1,23 @@
 // How complete the scan is: a ring seen from above as the scene is, with the sectors that were lost on the way.
 
 import { $, setText } from "./dom.js";
+import { isStale } from "./live.js";
 import { on } from "./store.js";
-import { degrees, percent } from "./units.js";
+import { degrees, percent, UNKNOWN } from "./units.js";
 
 const RADIUS = 20;
 const TURN = 2 * Math.PI;
 const ALMOST_ROUND = 0.999; // of a turn: an arc that ends where it begins would not be drawn
 
 export function mountDial() {
-  on(["frame", "source"], ({ completeness, gaps }, { live }) => {
-    $("dial").toggleAttribute("hidden", !live && !gaps?.length);
+  on(["frame", "source", "connection"], ({ completeness, gaps }, source, connection) => {
+    const stale = isStale(source, connection);
+    $("dial").toggleAttribute("hidden", !source.live && !gaps?.length);
+    $("dial").classList.toggle("stale", stale);
     if ($("dial").hasAttribute("hidden")) return;
     $("dial-lost").setAttribute("d", gaps.map(arc).join(""));
-    setText($("dial-text"), percent(completeness));
-    $("dial").setAttribute("aria-label", describe(completeness, gaps));
+    setText($("dial-text"), stale ? UNKNOWN : percent(completeness));
+    $("dial").setAttribute("aria-label", stale ? "No scan arrives" : describe(completeness, gaps));
   });
 }
 

@@ -2,8 +2,9 @@
 
 import { request } from "./api.js";
 import { $, el } from "./dom.js";
-import { attempt } from "./session.js";
-import { on } from "./store.js";
+import { attempt, open } from "./session.js";
+import { get, on } from "./store.js";
+import { toast } from "./toasts.js";
 
 const FAULTS = [
   { label: "Unplug", commands: ["unplug"] },
@@ -16,13 +17,21 @@ const FAULTS = [
 
 export function mountFaults() {
   const buttons = FAULTS.map(({ label, commands }) =>
-    el("button", { type: "button", onclick: () => attempt(() => sendAll(commands)) }, label),
+    el("button", { type: "button", onclick: () => disturb(commands) }, label),
   );
   $("faults").append(
     el("p", { class: "muted" }, "Done to the emulated lidar; shares are of its data packets."),
     el("div", { class: "fault-buttons" }, ...buttons),
   );
   on(["source"], ({ kind }) => ($("faults").hidden = kind !== "emulator"));
+}
+
+/** An emulator that has ended can bear no fault; another one can be had. */
+function disturb(commands) {
+  const { error } = get("source");
+  if (!error) return attempt(() => sendAll(commands), "The emulator did not do that");
+  const action = { label: "Start a new one", run: () => open({ kind: "emulator" }) };
+  return toast(error, { title: "The emulator has ended", kind: "error", action, about: "source" });
 }
 
 async function sendAll(commands) {

@@ -2,60 +2,100 @@
 
 import { $, el, setText } from "./dom.js";
 import { quantile } from "./history.js";
-import { nameOf, stateOf, stateText, troubleOf } from "./live.js";
+import { isStale, nameOf, stateOf, stateText, troubleOf } from "./live.js";
 import { on } from "./store.js";
 import { showPanel } from "./tabs.js";
-import { fixed, microseconds, milliseconds, percent } from "./units.js";
+import { COMPLETE_HINT, fixed, microseconds, milliseconds, percent, UNKNOWN } from "./units.js";
 
 const CONNECTION = { connecting: "Connecting", open: "Connected", lost: "Connection lost" };
 
+/** Figures of the frame shown, or (`now`) of what comes at present, which is not known when nothing comes. */
 const READOUTS = [
-  { key: "frame", label: "Frame", text: ({ frame }) => frame.sequence },
-  { key: "rate", label: "Rate", text: (now) => `${fixed(rateOf(now), 1)}\u2009Hz` },
-  { key: "latency", label: "Latency", text: () => milliseconds(quantile(({ age }) => age, 0.5)) },
-  { key: "extract", label: "Extraction", text: ({ frame }) => microseconds(frame.timings.extract_us) },
-  { key: "complete", label: "Complete", text: ({ frame }) => percent(frame.completeness) },
-  { key: "beams", label: "Beams", text: ({ frame }) => `${frame.n_valid}\u2009/\u2009${frame.n_beams}` },
+  {
+    key: "frame",
+    label: "Frame",
+    hint: "Scans worked on since the server started",
+    text: ({ frame }) => frame.sequence,
+  },
+  {
+    key: "rate",
+    label: "Rate",
+    hint: "Scans a second",
+    now: true,
+    text: (now) => `${fixed(rateOf(now), 1)}\u2009Hz`,
+  },
+  {
+    key: "latency",
+    label: "Latency",
+    hint: "From the last byte of a scan to sending it to this page, median",
+    now: true,
+    text: () => milliseconds(quantile(({ age }) => age, 0.5)),
+  },
+  {
+    key: "extract",
+    label: "Extraction",
+    hint: "Time to find segments and corners in this scan",
+    text: ({ frame }) => microseconds(frame.timings.extract_us),
+  },
+  {
+    key: "complete",
+    label: "Complete",
+    hint: COMPLETE_HINT,
+    now: true,
+    text: ({ frame }) => percent(frame.completeness),
+  },
+  {
+    key: "beams",
+    label: "Beams",
+    hint: "Beams with a return, of all in this scan",
+    text: ({ frame }) => `${frame.n_valid}\u2009/\u2009${frame.n_beams}`,
+  },
   { key: "segments", label: "Segments", text: ({ frame }) => frame.segments[frame.fitter]?.length ?? 0 },
   { key: "corners", label: "Corners", text: ({ frame }) => frame.corners.length },
-  { key: "dropped", label: "Dropped", text: ({ frame }) => frame.dropped },
+  {
+    key: "dropped",
+    label: "Dropped",
+    hint: "Scans not shown: overtaken by a newer one while the server was busy",
+    text: ({ frame }) => frame.dropped,
+  },
 ];
 
 export function mountHeader() {
-  const figures = READOUTS.map(({ key, label }) => [
-    key,
-    label,
-    el("dd", { id: `readout-${key}` }, "\u2013"),
-  ]);
   $("readouts").append(
     sourceReadout(),
-    ...figures.map(([key, label, value]) =>
-      el("div", { class: `readout ${key}-readout` }, el("dt", {}, label), value),
-    ),
+    ...READOUTS.map(readout),
   );
-  on(["frame", "source"], (frame, source) => {
-    for (const { key, text } of READOUTS) setText($(`readout-${key}`), text({ frame, source }));
+  on(["frame", "source", "connection"], (frame, source, connection) => {
+    const stale = isStale(source, connection);
+    $("readouts").classList.toggle("stale", stale);
+    for (const { key, now, text } of READOUTS)
+      setText($(`readout-${key}`), stale && now ? UNKNOWN : text({ frame, source }));
   });
   on(["connection"], (connection) => {
     $("connection").dataset.state = connection;
     setText($("connection"), CONNECTION[connection]);
   });
-  on(["source"], drawSource);
+  on(["source", "connection"], drawSource);
   on(["connection", "ready", "source"], showBanner);
+}
+
+function readout({ key, label, hint = "" }) {
+  const value = el("dd", { id: `readout-${key}` }, UNKNOWN);
+  return el("div", { class: `readout ${key}-readout`, title: hint }, el("dt", {}, label), value);
 }
 
 /** The name of what plays, with the state of a live source; it leads to the switch. */
 function sourceReadout() {
   const onclick = () => showPanel("sources", { focus: true });
-  const name = el("button", { type: "button", id: "readout-source", class: "state", onclick }, "\u2013");
+  const name = el("button", { type: "button", id: "readout-source", class: "state", onclick }, UNKNOWN);
   return el("div", { class: "readout source-readout" }, el("dt", {}, "Source"), el("dd", {}, name));
 }
 
-function drawSource(source) {
+function drawSource(source, connection) {
   const name = $("readout-source");
   setText(name, nameOf(source));
-  name.dataset.state = stateOf(source);
-  name.title = `${stateText(source)}. Choose what plays`;
+  name.dataset.state = stateOf(source, connection);
+  name.title = `${stateText(source, connection)}. Choose what plays`;
   document.title = `${nameOf(source)} · lidarcore`;
 }
 

@@ -25,17 +25,23 @@ export function nameOf({ kind, recording, device }) {
 }
 
 /** What the coloured dots stand for: the state of a live source, or how a recording plays. */
-export const stateOf = ({ device, state }) => device?.state ?? state;
+export const stateOf = ({ device, state }, connection) =>
+  connection === "lost" ? "lost" : (device?.state ?? state);
 
-/** The same in words; a live source goes on while the page is paused. */
-export function stateText({ device, state }) {
+/** Whether what is shown is not what happens now: nothing comes from the server, or nothing from the sensor. */
+export const isStale = ({ device }, connection) =>
+  connection === "lost" || Boolean(device && device.state !== "streaming");
+
+/** The same as the dots in words; a live source goes on while the page is paused. */
+export function stateText({ device, state }, connection) {
+  if (connection === "lost") return "Not known, the connection is lost";
   if (!device) return PLAYER_STATES[state] ?? state;
   const text = DEVICE_STATES[device.state] ?? device.state;
   return state === "paused" && device.state === "streaming" ? `${text}, the page is paused` : text;
 }
 
 /** What keeps a live source from showing anything new, with its cure; empty if nothing does. */
-export function troubleOf({ device }) {
+export function troubleOf({ device, error }) {
   if (!device || device.state === "streaming") return "";
-  return [stateText({ device }), device.error].filter(Boolean).join(". ");
+  return [stateText({ device }), device.error ?? error].filter(Boolean).join(". ");
 }

@@ -23,8 +23,9 @@ import { mountSource } from "./source.js";
 import { get, set } from "./store.js";
 import { connect } from "./stream.js";
 import { mountTabs } from "./tabs.js";
-import { bringPreference, mountTheme } from "./theme.js";
+import { bringPreference, keepTheme, mountTheme } from "./theme.js";
 import { mountTimeline } from "./timeline.js";
+import { clearToasts } from "./toasts.js";
 import { mountUpload } from "./upload.js";
 import { mountView } from "./view.js";
 
@@ -56,6 +57,8 @@ let joining; // no frame has come yet over this connection
 
 function join() {
   joining = true;
+  clearToasts("connection");
+  keepTheme();
   learn();
 }
 

@@ -33,7 +33,7 @@ export function optimistic(key, send) {
         const answer = await send(sending);
         if (pushes === before) server = answer; // what was pushed meanwhile is no older, and may be newer
       } catch (problem) {
-        report(problem);
+        report(problem, "The change was refused");
       }
       sending = null;
       publish();

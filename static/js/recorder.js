@@ -31,7 +31,8 @@ export async function toggleRecording() {
   if (busy) return;
   busy = true;
   const [verb, body] = isRecording() ? ["stop"] : ["start", { raw: raw.checked }];
-  const answer = await attempt(() => request("POST", `recorder/${verb}`, body));
+  const ask = () => request("POST", `recorder/${verb}`, body);
+  const answer = await attempt(ask, `The recorder did not ${verb}`);
   busy = false;
   if (answer) set("recorder", answer);
 }
@@ -64,10 +65,16 @@ let before = null;
 
 /** What has been recorded is offered; why a recording ended early is said. */
 function tell(recorder) {
-  const ended = before === "recording" && recorder.state !== "recording";
-  before = recorder.state;
-  if (!ended) return;
+  const recorded = before?.state === "recording" ? before.name : null;
+  before = recorder;
+  if (!recorded || recorder.state === "recording") return;
   refreshRecordings();
+  if (recorder.name) offer(recorder);
+  else
+    toast(`What was written of ${recorded} is in the library.`, { title: "Recording ended with the server" });
+}
+
+function offer(recorder) {
   const play = { label: "Play it", run: () => open({ kind: "recording", name: recorder.name }) };
   const facts = `${recorder.name}: ${clock(recorder.duration)}, ${bytes(recorder.size)}`;
   if (recorder.state === "failed")

@@ -4,7 +4,7 @@ import { request } from "./api.js";
 import { $, el, iconButton, remake } from "./dom.js";
 import { attempt, open } from "./session.js";
 import { on, set } from "./store.js";
-import { toast } from "./toasts.js";
+import { QUESTION_MS, toast } from "./toasts.js";
 import { bytes } from "./units.js";
 
 export function mountRecordings() {
@@ -13,7 +13,7 @@ export function mountRecordings() {
 }
 
 export async function refreshRecordings() {
-  const listing = await attempt(() => request("GET", "recordings"));
+  const listing = await attempt(() => request("GET", "recordings"), "The recordings could not be listed");
   if (listing) set("recordings", listing);
 }
 
@@ -52,11 +52,13 @@ function deleteButton(name, disabled) {
 
 function confirmDelete(name) {
   const remove = async () => {
-    await attempt(() => request("DELETE", `recordings/${encodeURIComponent(name)}`));
+    const path = `recordings/${encodeURIComponent(name)}`;
+    await attempt(() => request("DELETE", path), "The recording was not deleted");
     await refreshRecordings();
   };
   toast(`${name} will be deleted from the server.`, {
     title: "Delete this recording?",
     action: { label: "Delete", run: remove },
+    linger: QUESTION_MS,
   });
 }

@@ -3,7 +3,7 @@
 import { Problem, request } from "./api.js";
 import { optimistic } from "./optimistic.js";
 import { get, set } from "./store.js";
-import { report } from "./toasts.js";
+import { clearToasts, report } from "./toasts.js";
 import { chooseTopic } from "./topics.js";
 
 export const settings = optimistic("settings", (change) => request("PATCH", "settings", change));
@@ -30,11 +30,12 @@ export async function open(source) {
   set("opening", source);
   try {
     await request("PUT", "source", source);
+    clearToasts("source");
     return true;
   } catch (problem) {
     const topics = problem instanceof Problem && problem.members.topics;
     if (!topics?.length) {
-      report(problem, NOT_OPENED[source.kind]);
+      report(problem, NOT_OPENED[source.kind], "source");
       return false;
     }
     const topic = await chooseTopic(source.name, topics);
@@ -64,12 +65,12 @@ export async function select(corner) {
   }
 }
 
-/** Runs what may fail; reports the failure. */
-export async function attempt(action) {
+/** Runs what may fail; reports the failure under the title. */
+export async function attempt(action, title) {
   try {
     return await action();
   } catch (problem) {
-    report(problem);
+    report(problem, title);
     return undefined;
   }
 }

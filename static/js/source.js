@@ -13,12 +13,18 @@ const OPENING = {
   recording: ({ name }) => `Opening ${name}`,
 };
 
+const ENDED = {
+  device: "The device has gone",
+  emulator: "The emulator has ended",
+  recording: "The recording cannot be read on",
+};
+
 let lastRecording = null;
 let told = null;
 
 export function mountSource() {
   $("kinds").append(...Object.keys(KINDS).map(kindButton));
-  on(["source", "opening"], drawSwitch);
+  on(["source", "opening", "connection"], drawSwitch);
   on(["source"], drawFacts);
   on(["source"], ({ recording }) => (lastRecording = recording ?? lastRecording));
   on(["source"], tell);
@@ -44,14 +50,14 @@ async function openRecording() {
   else toast("Record something, or upload a file.", { title: "There is no recording yet" });
 }
 
-function drawSwitch(source, opening) {
+function drawSwitch(source, opening, connection) {
   for (const button of $("kinds").children) {
     const { kind } = button.dataset;
     button.setAttribute("aria-pressed", String(kind === source.kind));
     button.setAttribute("aria-busy", String(kind === opening?.kind));
   }
-  $("source-state").dataset.state = opening ? "connecting" : stateOf(source);
-  setText($("source-state"), opening ? OPENING[opening.kind](opening) : stateText(source));
+  $("source-state").dataset.state = opening ? "connecting" : stateOf(source, connection);
+  setText($("source-state"), opening ? OPENING[opening.kind](opening) : stateText(source, connection));
 }
 
 function drawFacts(source) {
@@ -77,8 +83,8 @@ function topicRows({ recording, topic, topics }) {
   return [el("div", { class: "row" }, el("label", { for: "topic" }, "Lidar topic"), list)];
 }
 
-/** What goes wrong while a recording plays is told once, wherever the user looks. */
-function tell({ error }) {
-  if (error && error !== told) toast(error, { title: "The recording cannot be read on", kind: "error" });
+/** What ends a source is told once, wherever the user looks. */
+function tell({ error, kind }) {
+  if (error && error !== told) toast(error, { title: ENDED[kind], kind: "error", about: "source" });
   told = error;
 }

@@ -1,5 +1,5 @@
 // Light or dark. The scene's theme is the server's and shared, so the page follows the settings; the first
-// browser to arrive brings its preference along.
+// browser to arrive brings its preference along, and a server that has started anew is told what is shown.
 
 import { request } from "./api.js";
 import { $ } from "./dom.js";
@@ -17,6 +17,19 @@ export function toggleTheme() {
   const theme = setting("view.theme") === "dark" ? "light" : "dark";
   localStorage.setItem("theme", theme);
   changeSetting("view.theme", theme);
+}
+
+let born = null; // Unix seconds when the server started
+
+/** To be called at every connection. */
+export async function keepTheme() {
+  const shown = document.documentElement.dataset.theme;
+  const health = await attempt(() => request("GET", "health"));
+  if (!health) return;
+  const started = Date.now() / 1000 - health.uptime_s;
+  const isAnother = born !== null && started - born > 1;
+  born = started;
+  if (isAnother) await changeSetting("view.theme", shown);
 }
 
 /** Sets the theme this browser was left with or prefers, unless others are watching already. */

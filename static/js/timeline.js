@@ -2,7 +2,7 @@
 // stepped back through, and playing jumps to what is live.
 
 import { $, el, iconButton, setIcon, setText } from "./dom.js";
-import { stateOf } from "./live.js";
+import { isStale, stateOf } from "./live.js";
 import { recorderControls } from "./recorder.js";
 import { isPlaying, step, togglePlaying, transport } from "./session.js";
 import { on } from "./store.js";
@@ -44,27 +44,27 @@ export function mountTimeline() {
     el("div", { class: "buttons pace" }, speed, loop),
     recorderControls(),
   );
-  on(["source"], drawSource);
+  on(["source", "connection"], drawSource);
   on(["source", "frame"], drawPosition);
 }
 
-function drawSource(source) {
+function drawSource(source, connection) {
   const playing = isPlaying(source);
   setIcon(play, playing ? "pause" : "play");
   const label = playing ? "Pause" : source.live ? "Back to live" : "Play";
   play.setAttribute("aria-label", label);
   play.title = label;
   $("timeline").classList.toggle("live", source.live);
-  badge.dataset.state = source.state === "paused" ? "paused" : stateOf(source);
-  setText(badge, badgeText(source));
+  badge.dataset.state = source.state === "paused" ? "paused" : stateOf(source, connection);
+  setText(badge, badgeText(source, connection));
   setText(duration, source.duration ? ` / ${clock(source.duration)}` : "");
   loop.setAttribute("aria-pressed", String(source.loop));
   if (document.activeElement !== speed) showSpeed(source.speed);
 }
 
-function badgeText({ state, device }) {
-  if (state === "paused") return "Paused";
-  return device?.state === "streaming" ? "Live" : "No signal";
+function badgeText(source, connection) {
+  if (source.state === "paused") return "Paused";
+  return isStale(source, connection) ? "No signal" : "Live";
 }
 
 /** A speed set elsewhere may be none of ours. */

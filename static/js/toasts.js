@@ -1,16 +1,19 @@
-// Messages that come and go, read out by screen readers. Errors stay until dismissed.
+// Messages that come and go, read out by screen readers. One that is pointed at or has the focus stays.
 
 import { $, el, iconButton } from "./dom.js";
 
-const LINGER_MS = 6000;
-const MOST = 4;
+export const QUESTION_MS = 30_000; // for messages that ask something
 
-/** Shows a message; `action` is an optional {label, run}. */
-export function toast(text, { title = "", kind = "info", action = null } = {}) {
+const LINGER_MS = 12_000;
+const LOOK_AGAIN_MS = 2000;
+const MOST = 3;
+
+/** Shows a message; `action` is an optional {label, run}, `about` what `clearToasts` clears it by. */
+export function toast(text, { title = "", kind = "info", action = null, about = "", linger = LINGER_MS } = {}) {
   const region = $("toasts");
   const same = [...region.children].find((node) => node.dataset.text === title + text);
   same?.remove();
-  const node = el("div", { class: `toast ${kind}` });
+  const node = el("div", { class: `toast ${kind}`, "data-about": about });
   node.dataset.text = title + text;
   const words = el("div", {}, ...(title ? [el("strong", {}, title)] : []), el("p", {}, text));
   node.append(words);
@@ -18,14 +21,27 @@ export function toast(text, { title = "", kind = "info", action = null } = {}) {
   node.append(iconButton("close", "Dismiss this message", () => node.remove()));
   region.append(node);
   while (region.children.length > MOST) region.firstElementChild.remove();
-  if (kind !== "error" && !action) setTimeout(() => node.remove(), LINGER_MS);
+  removeLater(node, linger);
 }
 
-/** Shows what went wrong, in the words of the server where it has some, under a better title if there is one. */
-export function report(error, title = error.title ?? "Something went wrong") {
+/** Removes the messages about something that is settled: the "source", or the "connection". */
+export function clearToasts(about) {
+  for (const node of $("toasts").querySelectorAll(`[data-about="${about}"]`)) node.remove();
+}
+
+function removeLater(node, wait) {
+  setTimeout(() => {
+    if (node.matches(":hover, :focus-within")) removeLater(node, LOOK_AGAIN_MS);
+    else node.remove();
+  }, wait);
+}
+
+/** Shows what went wrong, in the words of the server where it has some. */
+export function report(error, title = "That did not work", about = "") {
   if (!(error instanceof Error)) throw error;
   console.warn(error.message);
-  toast(error.message, { title, kind: "error" });
+  if (error.status === 0) toast(error.message, { title: error.title, kind: "error", about: "connection" });
+  else toast(error.message, { title, kind: "error", about });
 }
 
 function actionButton(node, { label, run }) {

@@ -1,5 +1,8 @@
 // Units and number texts. The API speaks SI; people read millimetres and degrees.
 
+export const UNKNOWN = "\u2013";
+export const COMPLETE_HINT = "Share of the turn whose measurements arrived, whether or not they have a return";
+
 const DEGREE = Math.PI / 180;
 
 /** How a field is shown: {unit, scale, digits}; shown value = SI value / scale. Small lengths go in mm. */

@@ -5,7 +5,7 @@ import { $, el, icon, iconButton, setText } from "./dom.js";
 import { refreshRecordings } from "./recordings.js";
 import { open } from "./session.js";
 import { showPanel } from "./tabs.js";
-import { report, toast } from "./toasts.js";
+import { QUESTION_MS, report, toast } from "./toasts.js";
 import { bytes } from "./units.js";
 
 const FORMATS = "ROS 1 and 2 bags, MCAP, CARMEN logs, RPLIDAR CSV and dumps, MATLAB, NumPy";
@@ -57,7 +57,7 @@ async function upload(file, overwrite = false) {
     await open({ kind: "recording", name: file.name });
   } catch (problem) {
     if (problem.status === 409 && !overwrite) offerOverwrite(file);
-    else if (problem.status !== ABORTED) report(problem);
+    else if (problem.status !== ABORTED) report(problem, "The file was not taken");
   } finally {
     row.node.remove();
   }
@@ -65,7 +65,8 @@ async function upload(file, overwrite = false) {
 
 function offerOverwrite(file) {
   const action = { label: "Replace it", run: () => upload(file, true) };
-  toast(`The server already has a recording named ${file.name}.`, { title: "Not uploaded", action });
+  const text = `The server already has a recording named ${file.name}.`;
+  toast(text, { title: "Not uploaded", action, linger: QUESTION_MS });
 }
 
 const ABORTED = -1;

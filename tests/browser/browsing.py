@@ -15,6 +15,7 @@ from urllib.parse import urlsplit
 
 import httpx
 import numpy as np
+import psutil
 from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Page, expect
@@ -65,6 +66,14 @@ class Server:
     def kill(self) -> None:
         os.kill(self._process.pid, signal.SIGKILL)
         self._process.wait()
+
+    def kill_emulator(self) -> None:
+        (emulator,) = (
+            child
+            for child in psutil.Process(self._process.pid).children(recursive=True)
+            if "lidarcore.rplidar.emulator" in child.cmdline()
+        )
+        emulator.kill()
 
     def get(self, path: str) -> dict:
         return self.api.get(path).raise_for_status().json()

@@ -61,6 +61,8 @@ class Watched:
         expect(self.page.locator("#source-state")).to_contain_text("Reconnecting by itself")
         expect(self.page.locator("#live")).to_have_text("No signal")
         expect(self.page.locator("#banner")).to_contain_text("once the lidar is back")
+        for figure in ("readout-rate", "readout-complete", "device-rate", "device-completeness", "dial-text"):
+            expect(self.page.locator(f"#{figure}")).to_have_text("\u2013")
         port = self.server.get("source")["device"]["port"]
         expect(self.page.locator("#source-facts .fault")).to_contain_text(port)
 
@@ -158,6 +160,50 @@ def test_faults_of_the_emulator_are_seen_in_the_page(live: Watched) -> None:
     live.press("No more faults")
     expect(live.page.locator("#device-completeness")).to_have_text("100\u2009%")
     expect(live.page.locator("#device-losses")).to_contain_text("nothing")
+
+
+def test_emulator_that_was_killed_is_told_of_and_another_one_is_started(live: Watched) -> None:
+    message = live.page.locator(".toast.error")
+    live.server.kill_emulator()
+    expect(message).to_contain_text("choose it again")
+    expect(live.page.locator("#banner")).to_contain_text("choose it again")
+    message.get_by_role("button", name="Dismiss this message").click()
+    live.press("Plug in again")
+    live.press("Start a new one")
+    live.expect_streaming()
+    live.server.kill_emulator()
+    expect(message).to_contain_text("choose it again")
+    live.press("Emulator")
+    live.expect_streaming()
+    expect(message).to_have_count(0)
+
+
+def test_refusal_is_told_in_plain_words_until_something_else_is_opened(visitor: Visitor) -> None:
+    visitor.tolerated.append("404")
+    page, message = visitor.page, visitor.page.locator(".toast.error")
+    tried = (
+        "import('/static/js/session.js').then(({ open }) => open({ kind: 'device', port: '/dev/ttyUSB99' }))"
+    )
+    assert page.evaluate(tried) is False
+    expect(message.locator("strong")).to_have_text("The device could not be opened")
+    expect(message).to_contain_text("/dev/ttyUSB99")
+    page.get_by_role("tab", name="Source").click()
+    page.get_by_role("button", name="Recording", exact=True).click()
+    expect(message).to_have_count(0)
+
+
+def test_message_goes_by_itself_but_not_while_it_has_the_focus(visit: Callable[..., Visitor]) -> None:
+    visitor = visit()
+    visitor.page.clock.install()
+    page = visitor.open().page
+    page.evaluate("import('/static/js/toasts.js').then(({ report }) => report(new Error('No room left.')))")
+    message = page.locator(".toast.error")
+    message.get_by_role("button", name="Dismiss this message").focus()
+    page.clock.fast_forward(15_000)
+    expect(message).to_contain_text("No room left.")
+    page.get_by_role("tab", name="Source").focus()
+    page.clock.fast_forward(3_000)
+    expect(message).to_have_count(0)
 
 
 def test_speed_changed_in_the_page_is_the_lidars(live: Watched) -> None:

@@ -96,9 +96,32 @@ def test_lost_connection_comes_back_by_itself(own_server: Server, visit: Callabl
     own_server.kill()
     expect(visitor.page.locator("#banner")).to_contain_text("Connection lost")
     expect(visitor.page.locator("#connection")).to_have_text("Connection lost")
+    expect(visitor.page.locator("#live")).to_have_text("No signal")
+    expect(visitor.page.locator("#readout-rate")).to_have_text("\u2013")
     own_server.start()
     expect(visitor.page.locator("#connection")).to_have_text("Connected")
     expect(visitor.page.locator("#banner")).to_be_hidden()
     shown, picture = int(visitor.readout("frame")), visitor.picture()
     wait_until(lambda: int(visitor.readout("frame")) > shown + 3, "frames advance again")
     wait_until(lambda: (visitor.picture() != picture).mean() > 0.001, "the scene moves again")
+
+
+def test_page_keeps_its_colours_and_says_what_became_of_the_recording_when_the_server_starts_anew(
+    own_server: Server, visit: Callable[..., Visitor]
+) -> None:
+    visitor = visit(at=own_server, theme="light")
+    visitor.tolerated += ["net::ERR_", "WebSocket", "Failed to fetch"]
+    page = visitor.open().page
+    expect(page.locator("html")).to_have_attribute("data-theme", "light")
+    name = own_server.api.post("recorder/start", json={}).raise_for_status().json()["name"]
+    expect(page.locator("#recorder-status")).to_contain_text("B/s")
+    own_server.kill()
+    own_server.start()
+    message = page.locator(".toast")
+    expect(message).to_contain_text("Recording ended with the server")
+    expect(message).to_contain_text(name)
+    expect(message.get_by_role("button", name="Play it")).to_have_count(0)
+    wait_until(
+        lambda: own_server.get("settings")["view"]["theme"] == "light", "the new server is told the theme"
+    )
+    expect(page.locator("html")).to_have_attribute("data-theme", "light")
