@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from lidarcore.rplidar.driver import Driver
 
 LONGEST = 1e8  # s, three years; a timer has an end
+ENOUGH = 0.9  # share of the duration asked for that counts as all of it
 
 
 def record(
@@ -44,17 +45,27 @@ def record(
     check_wishes(mode if emulator else None, rpm)  # what modes a real one has it has to be asked
     chosen = settings_from(settings, set_)
     _end_like_ctrl_c()
-    recorder = AsyncRecorder()
+    recorder, troubles = AsyncRecorder(), list[str]()
     with suppress(KeyboardInterrupt), ExitStack() as stack:
         stack.callback(recorder.stop)
         recorder.start(output, raw=raw, ellipse_scale=chosen.view.ellipse_scale)
         warm_up()
         if emulator:
             port = stack.enter_context(EmulatorProcess()).port
-        driver = stack.enter_context(Driver(port, baud=baud, mode=mode, rpm=rpm, tap=recorder.tap))
+        driver = Driver(
+            port,
+            baud=baud,
+            mode=mode,
+            rpm=rpm,
+            tap=recorder.tap,
+            on_change=lambda: troubles.append(driver.error) if driver.error else None,
+        )
+        stack.enter_context(driver)
         stack.enter_context(_progress(recorder, driver))
         _follow(driver, recorder, duration, chosen.extraction)
-    _conclude(output, recorder.status)
+    _conclude(output, recorder.status, troubles)
+    if duration is not None and recorder.status["duration"] < ENOUGH * duration:
+        raise SystemExit(1)
 
 
 def _end_like_ctrl_c() -> None:
@@ -110,8 +121,8 @@ def _amount(status: "RecorderJson") -> str:
     return f"{status['scans']} scans in {status['duration']:.1f} s, {size:.1f} MB, {rate:.0f} kB/s{dropped}"
 
 
-def _conclude(output: Path, status: "RecorderJson") -> None:
-    """Say what was recorded. Raises RecordingError if recording ended by itself, or nothing came."""
+def _conclude(output: Path, status: "RecorderJson", troubles: list[str]) -> None:
+    """Say what was recorded, and why it may lack something. Raises RecordingError if it ended by itself or is empty."""
     from lidarcore import RecordingError
 
     if status["error"]:
@@ -119,3 +130,5 @@ def _conclude(output: Path, status: "RecorderJson") -> None:
     if not status["scans"]:
         raise RecordingError("Nothing was recorded: no scan came.")
     typer.echo(f"{output}: {_amount(status)}")
+    for trouble in dict.fromkeys(troubles):
+        typer.echo(f"lidarcore: While recording: {trouble}", err=True)

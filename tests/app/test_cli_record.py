@@ -38,6 +38,21 @@ def test_it_records_for_a_while_and_says_how_much(tmp_path):
     assert sum(captured.get(round(scan.stamp, 2)) == len(scan) for scan in scans) >= len(scans) - 2
 
 
+def test_a_sensor_that_goes_away_is_told_of_at_the_end(tmp_path):
+    output = tmp_path / "a.mcap"
+    with EmulatorProcess() as emulator:
+        process = start(output, "--port", emulator.port, "--duration", 4)
+        deadline = time.monotonic() + 60
+        while not (output.exists() and output.stat().st_size):
+            assert time.monotonic() < deadline
+            time.sleep(0.05)
+        emulator.command("unplug")
+        said, complaint = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert f"{len(list(open_recording(output)))} scans" in said
+    assert "went away: check the sensor's cable" in complaint
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_properly(tmp_path, number):
     output = tmp_path / "a.mcap"
