@@ -28,6 +28,8 @@ class Scan:
     beam_times  (N,) s after `stamp`, or None
     odometry    (3,) x m, y m, heading rad: T_odom_sensor at `stamp`, or None
     gaps        (G, 2) rad, from and to, counter-clockwise: sectors whose data were lost on the way from the sensor
+    truth       (3,) x m, y m, heading rad: T_world_sensor at `stamp` as a simulator or an external reference has it,
+                for comparison only, or None; the heading is NaN where only the position is known
 
     Raises ScanError if the arrays are empty, not of one length, or a bearing is not finite or not in radians.
     """
@@ -39,6 +41,7 @@ class Scan:
     beam_times: Array | None = None
     odometry: Array | None = None
     gaps: Array = field(default_factory=lambda: np.empty((0, 2)))
+    truth: Array | None = None
 
     def __post_init__(self) -> None:
         bearings = as_row(self.bearings, "bearings")
@@ -68,12 +71,9 @@ class Scan:
             order = np.argsort(bearings % (2 * np.pi), kind="stable")
             columns = {name: column[order] for name, column in columns.items()}
         if self.odometry is not None:
-            pose = as_row(self.odometry, "odometry")
-            if pose.shape != (3,) or not np.isfinite(pose).all():
-                raise ScanError(
-                    f"odometry is {self.odometry}: give x (m), y (m) and heading (rad), all finite."
-                )
-            columns["odometry"] = pose
+            columns["odometry"] = _as_pose(self.odometry, "odometry", known=3)
+        if self.truth is not None:
+            columns["truth"] = _as_pose(self.truth, "truth", known=2)
         columns["gaps"] = _as_sectors(self.gaps)
         for name, column in columns.items():
             column.flags.writeable = False
@@ -111,6 +111,14 @@ def as_row(values: ArrayLike, name: str) -> Array:
     if row.ndim != 1:
         raise ScanError(f"{name} has shape {row.shape}: give one value for each beam, shape (N,).")
     return row
+
+
+def _as_pose(values: ArrayLike, name: str, known: int) -> Array:
+    """A private pose (3,) whose first `known` numbers are finite."""
+    pose = as_row(values, name)
+    if pose.shape != (3,) or not np.isfinite(pose[:known]).all():
+        raise ScanError(f"{name} is {values}: give x (m), y (m) and heading (rad), all finite.")
+    return pose
 
 
 def _as_sectors(gaps: ArrayLike) -> Array:

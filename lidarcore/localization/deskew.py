@@ -1,5 +1,7 @@
 """Takes the distortion out of a scan whose sensor moved and turned while it was measuring."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from lidarcore.errors import LocalizationError
@@ -23,4 +25,4 @@ def deskew(scan: Scan, v: float, w: float) -> Scan:
     moved = v * scan.beam_times * np.sinc(turned / (2 * np.pi)) * np.exp(0.5j * turned)
     points = moved + scan.ranges * np.exp(1j * (scan.bearings + turned))
     bearings = np.where(scan.valid, np.angle(points), wrap(scan.bearings + turned))
-    return Scan(np.abs(points), bearings, scan.stamp, scan.quality, scan.beam_times, scan.odometry, scan.gaps)
+    return replace(scan, ranges=np.abs(points), bearings=bearings)
