@@ -8,10 +8,7 @@ from lidarcore.scan import Array, Ints, Scan
 
 _STEPS = 6
 _LIKELY = 6.0  # reduced chi-square of a fit at most: real posts are not ideal cylinders
-_WIDTHS = (
-    0.6,
-    1.2,
-)  # of what the radius spans: the outermost beams miss, or see both the post and what is behind
+_WIDTHS = 0.6, 1.2  # of what the radius spans: the outermost beams miss, or see what is behind as well
 
 
 def find_posts(scan: Scan, radius: float, noise: SensorNoise, min_points: int = 5) -> Points:

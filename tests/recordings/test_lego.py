@@ -1,10 +1,11 @@
 """The LEGO robot's log: scans in one file, encoders beside it or among them."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from lidarcore import open_recording
+from lidarcore import ExtractionSettings, Scan, SensorNoise, extract, open_recording
 from lidarcore.poses import compose, inverse
 
 FOLDER = "brenner_lego_arena_groundtruth"
@@ -34,7 +35,10 @@ def test_bearings_stamps_and_error_codes(tmp_path: Path) -> None:
     path.write_text(scan_line(500) + scan_line(700))
     recording = open_recording(path)
     scan = next(iter(recording))
-    np.testing.assert_allclose(scan.bearings[[0, 330]], [-330 * 0.006135923151543 - 0.06981317, -0.06981317])
+    steps = np.array([0, 30, 32, 340, 680])  # the recorder lost 31, 63, ...
+    np.testing.assert_allclose(
+        scan.bearings[[0, 30, 31, 330, 659]], 2 * np.pi / 1024 * (steps - 340) - 0.06981317
+    )
     assert (scan.stamp, scan.ranges[0], scan.ranges[659]) == (0.5, 1.0, 1.659)
     assert np.flatnonzero(~scan.valid).tolist() == [330]
     assert scan.odometry is None
@@ -60,3 +64,34 @@ def test_a_scan_long_after_the_last_encoder_has_no_odometry(tmp_path: Path) -> N
         motor_line(0, 0, 0) + scan_line(10) + scan_line(400) + scan_line(9000) + motor_line(300, 9, 9)
     )
     assert [scan.odometry is None for scan in open_recording(path)] == [False, False, True]
+
+
+def test_truth_is_the_position_of_the_reference_at_the_stamp(tmp_path: Path) -> None:
+    path = tmp_path / "run_scan.txt"
+    path.write_text(scan_line(50) + scan_line(150) + scan_line(250))
+    (tmp_path / "run_reference.txt").write_text("P 100 1000 -200\nP oops\nP 200 2000 -400\n")
+    recording = open_recording(path)
+    before, between, after = recording
+    assert before.truth is None
+    assert after.truth is None
+    np.testing.assert_allclose(between.truth, [1.5, -0.3, np.nan])
+    assert any("Damaged lines of run_reference.txt" in note for note in recording.notes)
+
+
+def test_long_walls_of_the_square_arena_are_at_right_angles(data: Path) -> None:
+    """With the lost values in mind; as if the beams were evenly spaced, they are twice as far from it."""
+    scans = list(open_recording(data / FOLDER / "robot4_scan.txt"))
+    even = 2 * np.pi / 1024 * (np.arange(660) - 330)
+    assert skew(scans) < 0.6 * skew([replace(scan, bearings=even) for scan in scans])
+
+
+def skew(scans: list[Scan]) -> float:
+    """rad, median deviation of a scan's walls from the directions, a right angle apart, that suit them best."""
+    settings, deviations = ExtractionSettings(noise=SensorNoise(0.015, 0.004)), []
+    for scan in scans:
+        segments = extract(scan, settings).segments
+        along = (segments.end - segments.start)[segments.length > 0.4]
+        fourfold = np.exp(4j * np.arctan2(along[:, 1], along[:, 0]))
+        if len(along) > 1:
+            deviations.append(np.angle(fourfold / fourfold.sum()) / 4)
+    return float(np.median(np.abs(np.concatenate(deviations))))

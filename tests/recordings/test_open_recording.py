@@ -31,6 +31,7 @@ RECORDINGS = {
     "rplidar_raw_serial_hex/sample_data_motorctrl_1st_try.txt": "RPLIDAR hex dump",
     "rplidar_raw_serial_hex/sample_data_pyserial_1.txt.gz": "RPLIDAR hex dump",
     "rplidar_raw_serial_hex/sample_data_pyserial_3.txt": "RPLIDAR hex dump",
+    "slambot_rplidar_a1_encoders/data_24JUL14_14m.log.gz": "SLAMbot log",
     "windsor_rplidar_mat/scans_a.mat": "MATLAB .mat",
     "windsor_rplidar_mat/scans_b.mat": "MATLAB .mat",
     "tau_rplidar_c1_rooms/lab446__scans.json": "JSON point sets",
