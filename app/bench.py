@@ -9,6 +9,7 @@ from rich.table import Table
 
 from app.load import Load, measure_load
 from lidarcore.evaluation.accuracy import measure_accuracy
+from lidarcore.evaluation.filter_speed import time_localizer, time_slam
 from lidarcore.evaluation.speed import Timing, time_decoding, time_extraction, time_fits, time_growth
 from lidarcore.extraction import warm_up
 
@@ -17,10 +18,11 @@ SCANS, SEED = 400, 2026
 ACCURACY = {0.01: (0.995, 0.999), 0.02: (0.99, 0.99), 0.03: (0.99, 0.985), 0.05: (0.99, 0.97)}
 CORNER_RECALL, CORNER_RMS = 0.985, {0.01: 0.009}
 LOAD_SECONDS = 15.0
+SLAM_MS = {100: 0.3, 1_000: 5.0, 3_000: None}  # landmarks: at most so long a scan
 
 
 def run() -> None:
-    """Measure and print everything; takes about a minute and a half."""
+    """Measure and print everything; takes about two minutes."""
     console = Console()
     warm_up()
     console.print(f"{_processor()}, Python {platform.python_version()}, numpy {np.__version__}\n")
@@ -37,6 +39,8 @@ def run() -> None:
         )
     )
     console.print(_timings("More beams (extract)", time_growth()))
+    console.print(_timings("Extended Kalman filter, known map: 3 states, 12 corners", time_localizer()))
+    console.print(_slam())
     console.print(_accuracy())
     console.print(_load())
 
@@ -55,6 +59,25 @@ def _timings(title: str, rows: Sequence[Timing]) -> Table:
     for row in rows:
         limit = "" if row.limit is None else _judged(f"{row.limit:g}", row.median <= row.limit)
         table.add_row(row.what, f"{row.best:.2f}", f"{row.median:.2f}", limit)
+    return table
+
+
+def _slam() -> Table:
+    table = _table(
+        "SLAM: a whole step, association included, on a path through the map; processor time",
+        "landmarks", "in sight", "mean ms", "p99 ms", "worst ms", "full filter, numpy, ms",
+    )  # fmt: skip
+    for landmarks, limit in SLAM_MS.items():
+        times = time_slam(landmarks, limit)
+        mean = f"{times.mean:.2f}"
+        table.add_row(
+            f"{landmarks:,}",
+            f"{times.in_sight:.0f}",
+            mean if limit is None else _judged(f"{mean} (at most {limit:g})", times.mean <= limit),
+            f"{times.p99:.2f}",
+            f"{times.worst:.2f}",
+            f"{times.full:.2f}",
+        )
     return table
 
 

@@ -65,6 +65,14 @@ class UnknownLandmarkError(LandmarkMapError, LookupError):
     """The map holds no landmark with this id."""
 
 
+class UnknownSessionError(LandmarkMapError, LookupError):
+    """The database holds no session with this id."""
+
+
+class MapFileError(LandmarkMapError):
+    """No map comes from this file, or no such file from a map: format, version, unit, a bad landmark, no landmarks."""
+
+
 class LocalizationError(LidarError, ValueError):
     """What a filter was given cannot be used: shapes differ, or a number is not finite. Its state is untouched."""
 
@@ -79,3 +87,19 @@ class MotionError(LocalizationError):
 
 class LostError(LocalizationError):
     """The pose cannot be found from one scan alone: nothing in the map explains it, or several places do."""
+
+
+class SimulationError(LidarError, ValueError):
+    """What is to be simulated does not exist or does not fit: an unknown world or path, too many posts."""
+
+
+class ServerUnreachableError(LidarError):
+    """No server answers at this address."""
+
+
+class ClientError(LidarError):
+    """The server refused what a client asked for, and says why: `status`, `title` and `detail` (RFC 9457)."""
+
+    def __init__(self, status: int, title: str, detail: str) -> None:
+        super().__init__(f"{title} ({status}): {detail}")
+        self.status, self.title, self.detail = status, title, detail

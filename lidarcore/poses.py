@@ -6,10 +6,14 @@ from numpy.typing import ArrayLike
 from lidarcore.scan import Array
 
 
+def wrapped(angles: Array) -> Array:
+    """Angles rad wrapped into (-pi, pi], the one place where they are, for kernels too; NaN stays NaN."""
+    return np.pi - (np.pi - angles) % (2 * np.pi)
+
+
 def wrap(angles: ArrayLike) -> Array:
-    """Angles (...,) rad wrapped into (-pi, pi], the one place where they are; NaN stays NaN."""
-    wrapped: Array = np.pi - (np.pi - np.asarray(angles, np.float64)) % (2 * np.pi)
-    return wrapped
+    """Angles (...,) rad wrapped into (-pi, pi]; NaN stays NaN."""
+    return wrapped(np.asarray(angles, np.float64))
 
 
 def compose(T_a_b: Array, T_b_c: Array) -> Array:

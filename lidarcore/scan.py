@@ -117,7 +117,7 @@ def _as_pose(values: ArrayLike, name: str, known: int) -> Array:
     """A private pose (3,) whose first `known` numbers are finite."""
     pose = as_row(values, name)
     if pose.shape != (3,) or not np.isfinite(pose[:known]).all():
-        raise ScanError(f"{name} is {values}: give x (m), y (m) and heading (rad), all finite.")
+        raise ScanError(f"{name} is {pose}: give x (m), y (m) and heading (rad), all finite.")
     return pose
 
 

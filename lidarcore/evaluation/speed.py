@@ -37,16 +37,18 @@ def time_extraction(scans: int = 50, seed: int = 0) -> list[Timing]:
     settings = ExtractionSettings(noise=NOISE)
     compiled = extraction.compiled_call(BEAMS, settings)
     rows = [
-        _time("yardstick: np.cos(b); np.sin(b)", lambda: [(np.cos(b), np.sin(b)) for _, b in beams], scans)
+        time_calls(
+            "yardstick: np.cos(b); np.sin(b)", lambda: [(np.cos(b), np.sin(b)) for _, b in beams], scans
+        )
     ]
     for name, number in FITTER_IDS.items():
         run = partial(_each, compiled, beams, np.array([number]))
-        rows.append(_time(f"compiled call, {name}", run, scans, 12))
+        rows.append(time_calls(f"compiled call, {name}", run, scans, 12))
     run = partial(_each, compiled, beams, np.arange(len(FITTERS)))
-    rows.append(_time("compiled call, all six fitters", run, scans, 40))
-    rows.append(_time("extract()", partial(_extract_all, many, settings), scans, 30))
+    rows.append(time_calls("compiled call, all six fitters", run, scans, 40))
+    rows.append(time_calls("extract()", partial(_extract_all, many, settings), scans, 30))
     rows.append(
-        _time("compare(), all six fitters", lambda: [compare(scan, settings) for scan in many], scans)
+        time_calls("compare(), all six fitters", lambda: [compare(scan, settings) for scan in many], scans)
     )
     return rows
 
@@ -59,7 +61,7 @@ def time_fits(points: int = 100) -> list[Timing]:
     out = np.empty(LINE_FIELDS)
     variances = NOISE.sigma_range**2, NOISE.sigma_bearing**2
     return [
-        _time(f"one fit, {name}", partial(fit_beams, k, ranges, bearings, *variances, out), 1, 2)
+        time_calls(f"one fit, {name}", partial(fit_beams, k, ranges, bearings, *variances, out), 1, 2)
         for name, k in FITTER_IDS.items()
     ]
 
@@ -70,7 +72,7 @@ def time_growth(beams: Iterable[int] = (1_000, 3_000, 10_000, 30_000, 100_000)) 
     rows = []
     for n in beams:
         many = simulated_scans(n, 5, seed=1)
-        rows.append(_time(f"{n:,} beams", partial(_extract_all, many, settings), len(many)))
+        rows.append(time_calls(f"{n:,} beams", partial(_extract_all, many, settings), len(many)))
     return rows
 
 
@@ -79,8 +81,8 @@ def time_decoding(capsules: int = 2000) -> list[Timing]:
     stream = [encode_dense(15.552 * k % 360, np.arange(1000, 1040), sync=k == 0) for k in range(capsules)]
     at_once, hundredfold = b"".join(stream), 43.2
     return [
-        _time("one capsule, many at once", partial(_decode, [at_once]), capsules, hundredfold),
-        _time("one capsule, as it comes", partial(_decode, stream), capsules, hundredfold),
+        time_calls("one capsule, many at once", partial(_decode, [at_once]), capsules, hundredfold),
+        time_calls("one capsule, as it comes", partial(_decode, stream), capsules, hundredfold),
     ]
 
 
@@ -107,7 +109,7 @@ def _extract_all(scans: list[Scan], settings: ExtractionSettings) -> None:
         extract(scan, settings)
 
 
-def _time(what: str, run: Callable[[], object], calls: int, limit: float | None = None) -> Timing:
+def time_calls(what: str, run: Callable[[], object], calls: int, limit: float | None = None) -> Timing:
     """Time `run`, which makes this many calls, over about half a second."""
     run()
     number = max(1, int(0.01 / min(timeit.repeat(run, number=1, repeat=3))))

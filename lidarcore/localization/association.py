@@ -4,13 +4,15 @@ The sum of squared Mahalanobis distances is minimal over all one-to-one pairings
 one by one and contradict each other are then left out until all are jointly compatible (Neira and Tardós 2001).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
+from lidarcore.localization import kernels
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import LocalizationSettings
 from lidarcore.scan import Array, Ints
@@ -27,6 +29,7 @@ class Association:
     incompatible        (J, 2) of pairs that contradict the others: not used
     unmatched           (U,) observations without a landmark in their gate, some of them
     new                 (N,) far from every landmark of their kind
+    tentative           (T, 2) of pairs with landmarks that are not trusted yet: counted, not used
     """
 
     observed: Ints
@@ -35,19 +38,43 @@ class Association:
     incompatible: Ints
     unmatched: Ints
     new: Ints
+    tentative: Ints = field(default_factory=lambda: np.empty((0, 2), np.int64))
+
+    @classmethod
+    def none(cls, observed: int) -> "Association":
+        """Of this many observations, with no landmark."""
+        nothing, no_pairs = np.empty(0, np.int64), np.empty((0, 2), np.int64)
+        return cls(nothing, nothing, no_pairs, no_pairs, np.arange(observed), nothing)
+
+    def trusting(self, trusted: NDArray[np.bool_]) -> "Association":
+        """The same with only those of the pairs used whose landmark is trusted (L,)."""
+        used = trusted[self.landmark]
+        pairs = np.stack([self.observed, self.landmark], -1)
+        return replace(
+            self, observed=self.observed[used], landmark=self.landmark[used], tentative=pairs[~used]
+        )
+
+    def of(self, landmarks: Ints) -> "Association":
+        """The same in a map of which only these landmarks (L,) were looked at."""
+        pairs = {
+            name: np.stack([part[:, 0], landmarks[part[:, 1]]], -1)
+            for name in ("ambiguous", "incompatible", "tentative")
+            if len(part := getattr(self, name))
+        }
+        return replace(self, landmark=landmarks[self.landmark], **pairs)
 
     def without(self, pair: int) -> "Association":
         """The same with one pair found incompatible."""
-        return Association(
-            np.delete(self.observed, pair),
-            np.delete(self.landmark, pair),
-            self.ambiguous,
-            np.vstack([self.incompatible, [self.observed[pair], self.landmark[pair]]]),
-            self.unmatched,
-            self.new,
+        contradicting = [self.observed[pair], self.landmark[pair]]
+        return replace(
+            self,
+            observed=np.delete(self.observed, pair),
+            landmark=np.delete(self.landmark, pair),
+            incompatible=np.vstack([self.incompatible, contradicting]),
         )
 
 
+@lru_cache
 def gate_of(probability: float, dimension: int = 2) -> float:
     """Squared Mahalanobis distance that this share of the true pairs stays under."""
     return float(chdtri(dimension, 1 - probability))
@@ -65,7 +92,7 @@ def match(
     observed: Points, z: Array, S: Array, kinds: ArrayLike, settings: LocalizationSettings
 ) -> Association:
     """Match what was seen with landmarks expected at z (L, 2) m, sensor frame, covariances S (L, 2, 2), kinds (L,)."""
-    distances = squared_distances(observed.xy[:, None] - z, S + observed.covariance[:, None])
+    distances = kernels.all_squared_distances(observed.xy, observed.covariance, z, S)
     distances[np.asarray(observed.kinds)[:, None] != np.asarray(kinds)] = np.inf
     return associate(distances, settings)
 
@@ -73,17 +100,30 @@ def match(
 def associate(distances: Array, settings: LocalizationSettings) -> Association:
     """Pair observations with landmarks by squared Mahalanobis distances (K, L); inf where kinds differ."""
     gate, far = gate_of(settings.gate), gate_of(settings.new_gate)
-    near = np.flatnonzero((distances < gate).any(axis=0))
-    costs = np.where(distances[:, near] < gate, distances[:, near], _FORBIDDEN)
-    rows, columns, total = _assign(costs, far)
-    rivalled = _rivalled(costs, rows, columns, total, far, 2 * float(np.log(settings.ambiguity)))
-    pairs = np.stack([rows, near[columns]], -1)
+    within = distances < gate
+    clear = within & (within.sum(axis=1, keepdims=True) == 1) & (within.sum(axis=0) == 1)
+    rows, columns = np.nonzero(clear)
+    rivalled = np.zeros(len(rows), np.bool_)
+    if (contested := within & ~clear).any():
+        K, L = np.flatnonzero(contested.any(axis=1)), np.flatnonzero(contested.any(axis=0))
+        costs = np.where(within, distances, _FORBIDDEN)[np.ix_(K, L)]
+        some_rows, some_columns, total = _assign(costs, far)
+        some = _rivalled(costs, some_rows, some_columns, total, far, 2 * float(np.log(settings.ambiguity)))
+        rows, columns = np.concatenate([rows, K[some_rows]]), np.concatenate([columns, L[some_columns]])
+        rivalled = np.concatenate([rivalled, some])
     is_new = distances.min(axis=1, initial=np.inf) > far
-    is_new[rows] = False
-    unmatched = np.setdiff1d(np.flatnonzero(~is_new), rows)
+    unpaired = ~is_new
+    unpaired[rows] = False
+    pairs = np.stack([rows, columns], -1)
     none = np.empty((0, 2), np.int64)
-    used = pairs[~rivalled]
-    return Association(used[:, 0], used[:, 1], pairs[rivalled], none, unmatched, np.flatnonzero(is_new))
+    return Association(
+        rows[~rivalled],
+        columns[~rivalled],
+        pairs[rivalled],
+        none,
+        np.flatnonzero(unpaired),
+        np.flatnonzero(is_new),
+    )
 
 
 def _assign(costs: Array, unmatched: float) -> tuple[Ints, Ints, float]:
@@ -99,7 +139,7 @@ def _assign(costs: Array, unmatched: float) -> tuple[Ints, Ints, float]:
 
 def _rivalled(
     costs: Array, rows: Ints, columns: Ints, total: float, unmatched: float, margin: float
-) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+) -> NDArray[np.bool_]:
     """(P,) true for pairs whose best replacement costs less than the margin more."""
     allowed = costs < _FORBIDDEN
     contested = (allowed.sum(axis=1)[rows] > 1) | (allowed.sum(axis=0)[columns] > 1)

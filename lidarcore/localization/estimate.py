@@ -1,6 +1,6 @@
 """What a filter says after each scan, and the instants between which it moves."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,8 +20,9 @@ class Estimate:
     stamp       s
     pose        (3,) T_world_sensor: x m, y m, heading rad in (-pi, pi]
     covariance  (3, 3) of the pose
-    velocity    (2,) m/s and rad/s, or None if odometry moves the filter
+    velocity    (2,) m/s ahead and rad/s, or None if odometry moves the filter
     innovation  of the pairs that were used, with the association they are part of
+    sideways    m/s to the left, beside the velocity ahead
     """
 
     stamp: float
@@ -29,6 +30,7 @@ class Estimate:
     covariance: Array
     velocity: Array | None
     innovation: Innovation
+    sideways: float = 0.0
 
     @property
     def association(self) -> Association:
@@ -39,6 +41,22 @@ class Estimate:
     def coasting(self) -> bool:
         """True if nothing matched: the pose is only predicted, and its covariance has grown."""
         return len(self.association.observed) == 0
+
+    @classmethod
+    def of(cls, stamp: float, state: Array, P: Array, innovation: Innovation) -> "Estimate":
+        """From the state of a motion model and its covariance."""
+        if len(state) == 3:
+            return cls(stamp, state.copy(), P.copy(), None, innovation)
+        return cls(stamp, state[:3].copy(), P[:3, :3].copy(), state[3:5].copy(), innovation, float(state[5]))
+
+    def unmoved(self, observed: int) -> "Estimate":
+        """The same, after a scan of this many observations that was left out."""
+        return replace(self, innovation=no_innovation(observed))
+
+
+def no_innovation(observed: int) -> Innovation:
+    """Of so many observations that were not used."""
+    return Innovation(Association.none(observed), np.empty((0, 2)), np.empty((0, 0)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

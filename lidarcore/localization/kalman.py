@@ -1,10 +1,11 @@
-"""The joint correction of a Gaussian state by matched point landmarks [EKF 18-21]."""
+"""The innovation of matched point landmarks [EKF 18-21]."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.localization.association import Association, worst_pair
+from lidarcore.localization.association import Association, gate_of, worst_pair
+from lidarcore.localization.kernels import squared_distance
 from lidarcore.scan import Array, Ints
 
 
@@ -23,7 +24,7 @@ class Innovation:
     @property
     def nis(self) -> float:
         """nu^T S^-1 nu: chi-square distributed with 2 P degrees of freedom if the filter is honest."""
-        return float(self.value.ravel() @ np.linalg.solve(self.covariance, self.value.ravel()))
+        return float(squared_distance(self.value.ravel(), self.covariance))
 
     def compatible(self, probability: float) -> tuple["Innovation", Ints]:
         """Leave out pairs until the others are jointly compatible; also which pairs (P,) were kept."""
@@ -37,23 +38,7 @@ class Innovation:
         return innovation, kept
 
     def _worst(self, probability: float) -> int | None:
+        if self.nis <= gate_of(probability, 2 * len(self.value)):  # almost always: spares the inverse
+            return None
         information = np.asarray(np.linalg.inv(self.covariance), np.float64)
         return worst_pair(self.value.ravel(), information, probability)
-
-
-def block_diagonal(blocks: Array) -> Array:
-    """Matrices (P, 2, 2) on the diagonal of one (2 P, 2 P)."""
-    P = len(blocks)
-    matrix = np.zeros((P, 2, P, 2))
-    matrix[np.arange(P), :, np.arange(P)] = blocks
-    return matrix.reshape(2 * P, 2 * P)
-
-
-def correction(PHt: Array, innovation: Innovation) -> tuple[Array, Array]:
-    """What to add to the mean (n,), and W (n, 2 P) with P - W W^T the new covariance, from P H^T (n, 2 P).
-
-    With S = C C^T and W = P H^T C^-T the covariance stays symmetric whatever the rounding.
-    """
-    C = np.linalg.cholesky(innovation.covariance)
-    W = np.linalg.solve(C, PHt.T).T
-    return W @ np.linalg.solve(C, innovation.value.ravel()), W

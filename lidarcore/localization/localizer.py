@@ -3,10 +3,12 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lidarcore.localization.association import match
+from lidarcore.localization import kernels
+from lidarcore.localization.association import gate_of, match
 from lidarcore.localization.estimate import Estimate, Instant, as_pose
-from lidarcore.localization.kalman import Innovation, block_diagonal, correction
-from lidarcore.localization.measurement import to_sensor
+from lidarcore.localization.kalman import Innovation
+from lidarcore.localization.measurement import rotation
+from lidarcore.localization.moments import in_moments, joined
 from lidarcore.localization.motion import motion_model, start
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import LocalizationSettings
@@ -44,43 +46,51 @@ class Localizer:
         """Take the next stamp and odometry as they come, after a clock or an encoder was reset."""
         self._last = None
 
-    def step(self, observed: Points, stamp: float, odometry: ArrayLike | None = None) -> Estimate:
+    def step(
+        self,
+        observed: Points,
+        stamp: float,
+        odometry: ArrayLike | None = None,
+        times: Array | None = None,
+    ) -> Estimate:
         """Predict to the stamp (s), match the points seen (sensor frame), correct; odometry is T_odom_sensor (3,).
 
-        Without a match the filter coasts: the estimate says so, and the pose is the predicted one.
+        times (K,) s after the stamp say when each point was seen from where the sensor was then; only a filter with
+        a velocity can use them. Without a match the filter coasts: the estimate says so, and the pose is predicted.
         Raises MotionError if the clock went back, or odometry is missing or jumped.
         """
         now = Instant(stamp, None if odometry is None else np.asarray(odometry, np.float64))
-        state, P = self._predicted(now)
-        innovation, H = self._innovation(observed, state, P)
-        PHt = P[:, :3] @ H.T
-        change, W = correction(PHt, innovation)
-        state, P = state + change, P - W @ W.T
-        state[:3] = as_pose(state[:3], "the corrected pose")
-        self._state, self._P, self._last = state, P, now
-        return Estimate(
-            stamp,
-            state[:3].copy(),
-            P[:3, :3].copy(),
-            state[3:].copy() if len(state) > 3 else None,
-            innovation,
-        )
+        x, P = self._state.copy(), self._P.copy()
+        if self._last is not None:
+            self._motion.advance(x, P, len(x), *self._last.until(now, self.settings))
+        parts = []
+        for time, seen in in_moments(times, len(observed)):
+            self._shift(x, P, time)
+            parts.append((seen, self._correct(x, P, observed.subset(seen))))
+            self._shift(x, P, -time)
+        x[:3] = as_pose(x[:3], "the corrected pose")
+        self._state, self._P, self._last = x, P, now
+        return Estimate.of(stamp, x, P, joined(parts))
 
-    def _predicted(self, now: Instant) -> tuple[Array, Array]:
-        if self._last is None:
-            return self._state, self._P
-        state, F, Q = self._motion.predict(self._state, *self._last.until(now, self.settings))
-        return state, F @ self._P @ F.T + Q
+    def _shift(self, x: Array, P: Array, time: float) -> None:
+        """Go so many seconds on at the velocity of the state: a change of variables that can be undone."""
+        if time != 0:
+            state, F = self._motion.glide(x, time)
+            kernels.propagate(x, P, len(x), state, F, np.zeros_like(F))
 
-    def _innovation(self, observed: Points, state: Array, P: Array) -> tuple[Innovation, Array]:
-        """Innovation of the compatible pairs, and their Jacobian by the pose (2 P, 3)."""
-        z, H, R_sensor_world = to_sensor(state[:3], self.landmarks.xy)
-        M = R_sensor_world @ self.landmarks.covariance @ R_sensor_world.T
-        association = match(
-            observed, z, H @ P[:3, :3] @ H.transpose(0, 2, 1) + M, self.landmarks.kinds, self.settings
-        )
+    def _correct(self, x: Array, P: Array, observed: Points) -> Innovation:
+        """Correct by the compatible pairs, and tell them."""
+        known, independent = self.landmarks, np.zeros((len(self.landmarks), 3, 2))
+        z, S = kernels.expect(x, P, known.xy, independent, known.covariance)
+        far = gate_of(self.settings.new_gate)
+        near = kernels.within_any(kernels.all_squared_distances(observed.xy, observed.covariance, z, S), far)
+        association = match(observed, z[near], S[near], np.asarray(known.kinds)[near], self.settings).of(near)
         i, j = association.observed, association.landmark
-        H_pairs = H[j].reshape(-1, 3)
-        S = H_pairs @ P[:3, :3] @ H_pairs.T + block_diagonal(M[j] + observed.covariance[i])
-        innovation, kept = Innovation(association, observed.xy[i] - z[j], S).compatible(self.settings.gate)
-        return innovation, H[j][kept].reshape(-1, 3)
+        R_world_sensor, given = rotation(x[2]), np.full(len(j), -1)
+        noise = observed.covariance[i] + R_world_sensor.T @ known.covariance[j] @ R_world_sensor
+        S_pairs = kernels.innovation_covariance(x, P, z[j], noise, given)
+        innovation, kept = Innovation(association, observed.xy[i] - z[j], S_pairs).compatible(
+            self.settings.gate
+        )
+        kernels.correct(x, P, len(x), z[j[kept]], innovation.value, noise[kept], given[kept])
+        return innovation

@@ -8,11 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.compiled import kernel
 from lidarcore.errors import LocalizationError
-from lidarcore.localization.measurement import rotation
+from lidarcore.localization.kernels import odometry_variances, propagate, wrap
 from lidarcore.localization.points import check_covariance
 from lidarcore.localization.settings import LocalizationSettings, OdometryNoise, VelocityNoise
-from lidarcore.poses import wrap
 from lidarcore.scan import Array
 
 _SERIES = 1e-3  # rad, below which the series of the arc is exact to rounding and its quotients are not
@@ -20,8 +20,10 @@ _NODES, _WEIGHTS = (
     0.5 + np.sqrt([0.15, 0, 0.15]) * [-1, 0, 1],
     np.array([5, 8, 5]) / 18,
 )  # in [0, 1], three points
+_STANDING = np.zeros(3)
 
 
+@kernel
 def arc(v: float, w: float, dt: float) -> tuple[Array, Array]:
     """Pose (3,) after dt s at speed v m/s and turn rate w rad/s, seen from the start; its Jacobian (3, 2) by (v, w).
 
@@ -40,14 +42,93 @@ def arc(v: float, w: float, dt: float) -> tuple[Array, Array]:
     )
 
 
+@kernel
+def drift(velocity: Array, dt: float) -> tuple[Array, Array]:
+    """Pose (3,) after dt s at speeds v ahead and u to the left, turn rate w, seen from the start; velocity (v, w, u).
+
+    The arc of v, and that of u a quarter turn to the left of it; with its Jacobian (3, 3) by the velocity.
+    """
+    v, w, u = velocity[0], velocity[1], velocity[2]
+    ahead, J = arc(v, w, dt)
+    left, K = arc(u, w, dt)
+    J_drift = np.array(
+        [
+            [J[0, 0], J[0, 1] - K[1, 1], -K[1, 0]],
+            [J[1, 0], J[1, 1] + K[0, 1], K[0, 0]],
+            [0.0, dt, 0.0],
+        ]
+    )
+    return np.array([ahead[0] - left[1], ahead[1] + left[0], ahead[2]]), J_drift
+
+
+@kernel
 def move(pose: Array, increment: Array) -> tuple[Array, Array, Array]:
     """T_world_sensor (3,) after an increment (3,) seen from it; Jacobians (3, 3) by pose and by increment [EKF 24]."""
-    R = rotation(pose[2])
-    dx, dy = R @ increment[:2]
-    F, G = np.eye(3), np.eye(3)
-    F[0, 2], F[1, 2] = -dy, dx
-    G[:2, :2] = R
-    return np.array([pose[0] + dx, pose[1] + dy, wrap(pose[2] + increment[2])]), F, G
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    moved, F, G = np.empty(3), np.eye(3), np.eye(3)
+    G[0, 0], G[0, 1], G[1, 0], G[1, 1] = c, -s, s, c
+    F[0, 2], F[1, 2] = -s * increment[0] - c * increment[1], c * increment[0] - s * increment[1]
+    moved[0], moved[1], moved[2] = pose[0] + F[1, 2], pose[1] - F[0, 2], wrap(pose[2] + increment[2])
+    return moved, F, G
+
+
+@kernel
+def _by_odometry(pose: Array, increment: Array, noise: Array) -> tuple[Array, Array, Array]:
+    """State, Jacobian and noise of an increment with the noise of OdometryNoise, as its table (5,)."""
+    moved, F, G = move(pose, increment)
+    ahead, across, turn = odometry_variances(increment, noise)
+    c, s, Q = G[0, 0], G[1, 0], np.zeros((3, 3))
+    Q[0, 0], Q[1, 1], Q[2, 2] = c * c * ahead + s * s * across, s * s * ahead + c * c * across, turn
+    Q[0, 1] = Q[1, 0] = c * s * (ahead - across)
+    return moved, F, Q
+
+
+@kernel
+def _glide(state: Array, dt: float) -> tuple[Array, Array]:
+    """State (6,) after dt s at the velocity it has, and its Jacobian (6, 6)."""
+    step, J = drift(state[3:], dt)
+    pose, F_pose, G = move(state[:3], step)
+    F = np.eye(6)
+    for i in range(3):
+        for j in range(3):
+            F[i, j] = F_pose[i, j]
+            F[i, 3 + j] = G[i, 0] * J[0, j] + G[i, 1] * J[1, j] + G[i, 2] * J[2, j]
+    return np.concatenate((pose, state[3:])), F
+
+
+@kernel
+def _at_constant_velocity(state: Array, dt: float, rates: Array) -> tuple[Array, Array, Array]:
+    """State, Jacobian and noise after dt s in which the velocity changes as white noise of these rates (3,), squared.
+
+    The noise is the sum of what accelerations at each moment do to the end of the step, by Gauss-Legendre quadrature.
+    """
+    end, F = _glide(state, dt)
+    Q, effect = np.zeros((6, 6)), np.eye(6)[:, 3:]
+    for node in range(len(_NODES)):
+        left = dt * _NODES[node]
+        J, turned = drift(state[3:], left)[1], state[2] + state[4] * (dt - left)
+        c, s = np.cos(turned), np.sin(turned)
+        for k in range(3):
+            effect[0, k] = c * J[0, k] - s * J[1, k]
+            effect[1, k] = s * J[0, k] + c * J[1, k]
+            effect[2, k] = J[2, k]
+        for i in range(6):
+            for j in range(6):
+                for k in range(3):
+                    Q[i, j] += _WEIGHTS[node] * dt * effect[i, k] * rates[k] * effect[j, k]
+    return end, F, Q
+
+
+@kernel
+def _advance_by_odometry(x: Array, P: Array, n: int, increment: Array, noise: Array) -> None:
+    state, F, Q = _by_odometry(x, increment, noise)
+    propagate(x, P, n, state, F, Q)
+
+
+@kernel
+def _advance_at_constant_velocity(x: Array, P: Array, n: int, dt: float, rates: Array) -> None:
+    state, F, Q = _at_constant_velocity(x[:6], dt, rates)
+    propagate(x, P, n, state, F, Q)
 
 
 class Motion(Protocol):
@@ -58,6 +139,12 @@ class Motion(Protocol):
     def predict(self, state: Array, dt: float, increment: Array | None) -> tuple[Array, Array, Array]:
         """State (size,), Jacobian F and noise Q (size, size)."""
 
+    def glide(self, state: Array, dt: float) -> tuple[Array, Array]:
+        """State (size,) after dt s, or before it, at the velocity in the state, and its Jacobian (size, size)."""
+
+    def advance(self, x: Array, P: Array, n: int, dt: float, increment: Array | None) -> None:
+        """Predict a Gaussian in place: mean x (n,), covariance P (n, n), this state before the others."""
+
 
 class OdometryMotion:
     """State (x, y, heading): moves by what odometry says, with noise that grows with the way and the turn."""
@@ -65,42 +152,43 @@ class OdometryMotion:
     size = 3
 
     def __init__(self, noise: OdometryNoise) -> None:
-        self._noise = noise
+        self._noise = noise.table
 
     def predict(self, state: Array, dt: float, increment: Array | None) -> tuple[Array, Array, Array]:
         """Move by the increment (3,) m, m, rad in the sensor frame; without one the sensor stands."""
-        u = np.zeros(3) if increment is None else increment
-        state, F, G = move(state, u)
-        return state, F, G @ self._noise.covariance(u) @ G.T
+        return _by_odometry(state, _STANDING if increment is None else increment, self._noise)
+
+    def advance(self, x: Array, P: Array, n: int, dt: float, increment: Array | None) -> None:
+        """The same as predict, in place."""
+        _advance_by_odometry(x, P, n, _STANDING if increment is None else increment, self._noise)
+
+    def glide(self, state: Array, dt: float) -> tuple[Array, Array]:
+        """Without a velocity the sensor stands."""
+        return state, np.eye(3)
 
 
 class ConstantVelocity:
-    """State (x, y, heading, v, w): v and w keep their values but for white accelerations [EKF 14-15]."""
+    """State (x, y, heading, v, w, u): speeds ahead and to the left and the turn rate stay, but for white accelerations.
 
-    size = 5
+    [EKF 14-15] with u beside v: a sensor that is carried, or looks elsewhere than its wheels roll, is no unicycle.
+    """
+
+    size = 6
 
     def __init__(self, noise: VelocityNoise) -> None:
-        self._noise = noise
+        self._rates = np.square([noise.acceleration, noise.turn_acceleration, noise.sideways])
 
     def predict(self, state: Array, dt: float, increment: Array | None) -> tuple[Array, Array, Array]:
-        """Move along the arc of v and w; odometry is not used."""
-        step, J = arc(state[3], state[4], dt)
-        pose, F_pose, G = move(state[:3], step)
-        F = np.eye(5)
-        F[:3, :3], F[:3, 3:] = F_pose, G @ J
-        return np.concatenate([pose, state[3:]]), F, self._process_noise(state, dt)
+        """Move along the arc of v, w and u; odometry is not used."""
+        return _at_constant_velocity(state, dt, self._rates)
 
-    def _process_noise(self, state: Array, dt: float) -> Array:
-        """Sum of what accelerations at each moment do to the end of the step, by Gauss-Legendre quadrature."""
-        rates = [self._noise.acceleration**2, self._noise.turn_acceleration**2]
-        Q = np.zeros((5, 5))
-        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
-            left = dt * node
-            effect = np.eye(5)[:, 3:]
-            effect[:3] = arc(state[3], state[4], left)[1]
-            effect[:2] = rotation(state[2] + state[4] * (dt - left)) @ effect[:2]
-            Q += weight * dt * (effect * rates) @ effect.T
-        return Q
+    def glide(self, state: Array, dt: float) -> tuple[Array, Array]:
+        """Move along the arc of v, w and u."""
+        return _glide(state, dt)
+
+    def advance(self, x: Array, P: Array, n: int, dt: float, increment: Array | None) -> None:
+        """The same as predict, in place."""
+        _advance_at_constant_velocity(x, P, n, dt, self._rates)
 
 
 def motion_model(settings: LocalizationSettings) -> Motion:
@@ -123,6 +211,7 @@ def start(pose: Array, covariance: ArrayLike, settings: LocalizationSettings) ->
     check_covariance(P, "The pose's covariance")
     if settings.motion == "odometry":
         return pose, P
-    full = np.diag([0.0, 0.0, 0.0, settings.velocity.speed**2, settings.velocity.turn_rate**2])
+    speed, turn_rate = settings.velocity.speed**2, settings.velocity.turn_rate**2
+    full = np.diag([0.0, 0.0, 0.0, speed, turn_rate, speed if settings.velocity.sideways else 0.0])
     full[:3, :3] = P
-    return np.concatenate([pose, np.zeros(2)]), full
+    return np.concatenate([pose, np.zeros(3)]), full

@@ -7,9 +7,10 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarcore.clusters import Clusters
 from lidarcore.errors import CovarianceError, LocalizationError
 from lidarcore.features import Corners
-from lidarcore.scan import Array
+from lidarcore.scan import Array, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,22 +46,50 @@ class Points:
         if not np.isfinite(xy).all():
             raise LocalizationError("A point is not finite: leave it out.")
         check_covariance(covariance, "A point's covariance")
-        columns = {
-            "xy": xy,
-            "covariance": np.broadcast_to(covariance, (len(xy), 2, 2)).copy(),
-            "kinds": np.broadcast_to(kinds, len(xy)).copy(),
-        }
-        for name, column in columns.items():
+        self._set(
+            xy, np.broadcast_to(covariance, (len(xy), 2, 2)).copy(), np.broadcast_to(kinds, len(xy)).copy()
+        )
+
+    def _set(self, xy: Array, covariance: Array, kinds: NDArray[np.str_]) -> None:
+        for name, column in (("xy", xy), ("covariance", covariance), ("kinds", kinds)):
             column.flags.writeable = False
             object.__setattr__(self, name, column)
 
+    def with_new(self, xy: Array, covariance: Array, kinds: NDArray[np.str_] | None = None) -> Self:
+        """Points (K', 2) with covariances (K', 2, 2) derived from these: known to be finite and positive definite."""
+        points = object.__new__(type(self))
+        points._set(xy, covariance, np.asarray(self.kinds) if kinds is None else kinds)
+        return points
+
     def __len__(self) -> int:
         return len(self.xy)
+
+    def subset(self, which: NDArray[np.bool_] | Ints) -> Self:
+        """Those of which (K,) is true, or with these indices."""
+        return self.with_new(self.xy[which], self.covariance[which], np.asarray(self.kinds)[which])
+
+    def blurred(self, sigma: float | Array) -> Self:
+        """The same with a further independent error of this standard deviation, m, for all or for each (K,)."""
+        blur = np.square(sigma)[..., None, None] * np.eye(2)
+        return self.with_new(self.xy, self.covariance + blur)
+
+    def scaled(self, factor: float) -> Self:
+        """The same with covariances so many times as large."""
+        return self.with_new(self.xy, factor * self.covariance)
 
     @classmethod
     def from_corners(cls, corners: Corners) -> Self:
         """The corners of a scan with their consistent covariances: the published ones claim too much for a filter."""
         return cls(corners.xy, corners.covariance_consistent, "corner")
+
+    @classmethod
+    def from_clusters(cls, clusters: Clusters) -> Self:
+        """The means of the clusters of a scan, uncertain by the width of each beside the noise.
+
+        The mean is of the side in view: as the sensor goes around an object, the mean wanders about as far as the
+        object is wide.
+        """
+        return cls(clusters.means, clusters.covariances, "cluster").blurred(widths(clusters) / 2)
 
     @classmethod
     def joined(cls, parts: Sequence["Points"]) -> Self:
@@ -70,6 +99,13 @@ class Points:
             np.concatenate([part.covariance for part in parts]),
             np.concatenate([np.asarray(part.kinds) for part in parts]),
         )
+
+
+def widths(clusters: Clusters) -> Array:
+    """How wide each cluster (K,) is, m: the length of a line whose points scatter as much."""
+    scatter = np.linalg.eigvalsh(clusters.scatters)[:, -1] if len(clusters) else np.empty(0)
+    width: Array = np.sqrt(12 * np.maximum(scatter, 0.0))
+    return width
 
 
 def check_covariance(matrices: ArrayLike, name: str) -> None:

@@ -4,46 +4,129 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.localization.association import Association
+from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.settings import LocalizationSettings
-from lidarcore.scan import Ints
+from lidarcore.localization.visibility import Costs
+from lidarcore.scan import Array, Ints
+
+_SECTORS = 64  # directions from which a landmark may have been seen, 5.6 degrees each
+_FORGOTTEN = 3.0  # s without a sighting, after which a tentative landmark is dropped
+_ENOUGH = 3  # landmarks, below which their share says nothing
+_SHARE = 0.25  # of the landmarks that a scan could show: fewer would be chance
 
 
 class Register:
-    """Ids, kinds and trust of L landmarks.
+    """Ids, kinds, sightings and trust of L landmarks.
 
-    Trust grows by one with each sighting, up to a limit, and falls by one with each view of the place without it:
-    below zero the landmark is not there. It is confirmed once trust has reached a number.
+    Trust grows by one with each sighting, up to a limit, and falls with each view of the place without it: below
+    zero the landmark is not there. Views count only from where it was seen before, as near or nearer: from most
+    directions the corner of a box is none. It is confirmed once trust and the time since its first sighting suffice.
     """
 
     def __init__(self, settings: LocalizationSettings) -> None:
-        self._confirm, self._most = settings.confirm, max(settings.memory, settings.confirm)
+        self._confirm, self._settle = settings.confirm, settings.settle
+        self._most = max(settings.memory, settings.confirm)
         self._next = 0
+        self.possible = self.recognised = 0  # confirmed ones that the last scan could have shown, and did
         self.ids: Ints = np.empty(0, np.int64)
         self.kinds: NDArray[np.str_] = np.empty(0, np.str_)
         self.confirmed: NDArray[np.bool_] = np.empty(0, np.bool_)
-        self._trust: Ints = np.empty(0, np.int64)
+        self.counts: Ints = np.empty(0, np.int64)
+        self.first_seen: Array = np.empty(0)
+        self.last_seen: Array = np.empty(0)
+        self._trust: Array = np.empty(0)
+        # m, largest distance at which each was seen in each direction; NaN if unknown
+        self._seen_from: Array = np.empty((0, _SECTORS))
 
-    def add(self, kinds: NDArray[np.str_]) -> None:
-        """Append landmarks of these kinds (K,), seen once."""
+    def add(self, kinds: NDArray[np.str_], stamp: float) -> None:
+        """Append landmarks of these kinds (K,), first seen at the stamp (s)."""
         K = len(kinds)
-        self.ids = np.concatenate([self.ids, np.arange(self._next, self._next + K)])
-        self.kinds = np.concatenate([self.kinds, kinds])
-        self._trust = np.concatenate([self._trust, np.ones(K, np.int64)])
-        self.confirmed = np.concatenate([self.confirmed, np.full(K, self._confirm <= 1)])
+        new = {
+            "ids": np.arange(self._next, self._next + K),
+            "kinds": kinds,
+            "confirmed": np.zeros(K, np.bool_),
+            "counts": np.ones(K, np.int64),
+            "first_seen": np.full(K, stamp),
+            "last_seen": np.full(K, stamp),
+            "_trust": np.ones(K),
+            "_seen_from": np.zeros((K, _SECTORS)),
+        }
+        for name, values in new.items():
+            setattr(self, name, np.concatenate([getattr(self, name), values]))
         self._next += K
 
-    def count(self, association: Association, visible: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Count one scan, given which landmarks (L,) should be seen; forget those that are not there.
+    def add_known(self, landmarks: Landmarks) -> None:
+        """Append the landmarks of a map with their ids; those that are confirmed are trusted as far as any."""
+        self.add(np.asarray(landmarks.points.kinds), 0.0)
+        K = len(landmarks)
+        for name in ("ids", "confirmed", "counts", "first_seen", "last_seen"):
+            getattr(self, name)[-K:] = getattr(landmarks, name)
+        self._seen_from[-K:] = np.nan
+        self._trust[-K:] = np.where(landmarks.confirmed, self._most, 1)
+        self._next = int(landmarks.ids.max()) + 1
 
-        Returns (L,) true for the landmarks that are kept. What an ambiguous pair may have shown is not missed.
+    @property
+    def is_at_odds(self) -> bool:
+        """The last scan did not show what it should have, but other things: the sensor is not where it seems to be."""
+        return is_at_odds(self.possible, self.recognised)
+
+    def count(
+        self, association: Association, observed: int, stamp: float, costs: Costs, views: Array
+    ) -> NDArray[np.bool_]:
+        """Count a scan of so many observations at the stamp (s); (L,) true for the landmarks that are to be kept.
+
+        views (L, 2) m, world frame, lead from each landmark to the sensor. Costs say what trust is lost by those
+        that were not seen; what an ambiguous pair may have shown is not missed.
         """
-        missed = visible.copy()
-        missed[association.landmark] = False
-        missed[association.ambiguous[:, 1]] = missed[association.incompatible[:, 1]] = False
-        self._trust[association.landmark] += 1
-        self._trust = np.minimum(self._trust - missed, self._most)
-        self.confirmed = self.confirmed | (self._trust >= self._confirm)
-        kept: NDArray[np.bool_] = self._trust >= 0
-        self.ids, self.kinds = self.ids[kept], self.kinds[kept]
-        self._trust, self.confirmed = self._trust[kept], self.confirmed[kept]
+        seen = np.concatenate([association.landmark, association.tentative[:, 1]])
+        distances, directions = np.hypot(*views.T), np.arctan2(views[:, 1], views[:, 0]) / (2 * np.pi)
+        here = np.arange(len(views)), np.floor(_SECTORS * directions).astype(np.int64) % _SECTORS
+        farthest = self._seen_from[here]
+        self._seen_from[seen, here[1][seen]] = np.fmax(farthest, distances)[seen]
+        self._recognise(seen, observed, (costs.unseen > 0) & ~(distances > farthest))
+        missed = np.maximum(costs.absent, costs.unseen * (distances <= farthest))
+        missed[seen] = missed[association.ambiguous[:, 1]] = missed[association.incompatible[:, 1]] = 0.0
+        if not self.is_at_odds:
+            self._trust -= missed
+        self._trust[seen] += 1
+        self._trust = np.minimum(self._trust, self._most)
+        self.counts[seen] += 1
+        self.last_seen[seen] = stamp
+        self.first_seen = np.minimum(self.first_seen, self.last_seen)  # the clock may have gone back
+        settled = self.last_seen - self.first_seen >= self._settle
+        self.confirmed = self.confirmed | ((self._trust >= self._confirm) & settled)
+        fresh = stamp - self.last_seen <= _FORGOTTEN
+        kept: NDArray[np.bool_] = (self._trust >= 0) & (self.confirmed | fresh)
         return kept
+
+    def _recognise(self, seen: Ints, observed: int, expected: NDArray[np.bool_]) -> None:
+        expected[seen] = True
+        self.possible = min(int((expected & self.confirmed).sum()), observed)
+        self.recognised = int(self.confirmed[seen].sum())
+
+    def merge(self, kept: int, dropped: int) -> None:
+        """Add what is known of one landmark to another, which is the same; `keep` has to follow."""
+        self.counts[kept] += self.counts[dropped]
+        self.first_seen[kept] = min(self.first_seen[kept], self.first_seen[dropped])
+        self.last_seen[kept] = max(self.last_seen[kept], self.last_seen[dropped])
+        self._trust[kept] = max(self._trust[kept], self._trust[dropped])
+        self._seen_from[kept] = np.fmax(self._seen_from[kept], self._seen_from[dropped])
+
+    def keep(self, kept: NDArray[np.bool_]) -> None:
+        """Forget the landmarks that are not in kept (L,)."""
+        for name in (
+            "ids",
+            "kinds",
+            "confirmed",
+            "counts",
+            "first_seen",
+            "last_seen",
+            "_trust",
+            "_seen_from",
+        ):
+            setattr(self, name, getattr(self, name)[kept])
+
+
+def is_at_odds(possible: int, recognised: int) -> bool:
+    """True if so few of the landmarks that a scan could show were recognised that the pose must be wrong."""
+    return possible >= _ENOUGH and recognised < _SHARE * possible

@@ -7,6 +7,7 @@ Two observed points and two landmarks equally far apart fix a pose; the pose tha
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lidarcore.errors import LostError
@@ -31,25 +32,26 @@ class Relocation:
 
 
 def relocalize(observed: Points, landmarks: Points, min_pairs: int = 4) -> Relocation:
-    """Find the one pose from which the landmarks of the map explain at least min_pairs of the points seen.
+    """Find the one pose from which the landmarks of the map explain min_pairs of the points seen, and half of them.
 
     Raises LostError if there is none, or several explain as much: a symmetric room, or too few points.
     """
     found: list[Relocation] = []
-    poses = _hypotheses(observed, landmarks)
-    counts = np.array([len(_pairs(pose, observed, landmarks)) for pose in poses], np.int64)
+    min_pairs = max(min_pairs, (len(observed) + 1) // 2)
+    if min(len(observed), len(landmarks)) < min_pairs:
+        raise _unexplained(min_pairs, observed)
+    poses, tree = _hypotheses(observed, landmarks), cKDTree(landmarks.xy)
+    counts = _counts(poses, observed, landmarks, tree)
     for pose in poses[np.argsort(-counts, kind="stable")[: np.sum(counts >= min_pairs)]]:
         if not any(_same(pose, known.pose) for known in found):
-            candidate = _refine(pose, observed, landmarks)
-            if not any(_same(candidate.pose, known.pose) for known in found):
+            candidate = _refine(pose, observed, landmarks, tree)
+            if candidate and not any(_same(candidate.pose, known.pose) for known in found):
                 found.append(candidate)
         if len(found) > 1 and len(found[-1].pairs) < len(found[0].pairs):
             break
     found.sort(key=lambda relocation: -len(relocation.pairs))
     if not found or len(found[0].pairs) < min_pairs:
-        raise LostError(
-            f"No pose explains {min_pairs} of the {len(observed)} points seen: move on and try again."
-        )
+        raise _unexplained(min_pairs, observed)
     if len(found) > 1 and len(found[1].pairs) == len(found[0].pairs):
         raise LostError(
             f"Several poses explain {len(found[0].pairs)} of the {len(observed)} points seen, such as "
@@ -84,26 +86,44 @@ def _onto(points: Array, start: Array, end: Array) -> Array:
     return np.stack([position.real, position.imag, turn], -1)
 
 
-def _pairs(pose: Array, observed: Points, landmarks: Points) -> Ints:
-    """(P, 2) one-to-one pairs of observations and landmarks that lie within each other's reach."""
-    placed = pose[:2] + observed.xy @ rotation(pose[2]).T
-    distance, nearest = cKDTree(landmarks.xy).query(placed)
+def _counts(poses: Array, observed: Points, landmarks: Points, tree: cKDTree) -> Ints:
+    """About how many pairs (H,) each pose (H, 3) explains; a landmark may count twice."""
+    z, turn = observed.xy @ [1, 1j], np.exp(1j * poses[:, 2:])
+    placed = poses[:, :1] + 1j * poses[:, 1:2] + turn * z
+    _, close = _nearest(np.stack([placed.real, placed.imag], -1), observed, landmarks, tree)
+    counts: Ints = close.sum(axis=-1, dtype=np.int64)
+    return counts
+
+
+def _nearest(
+    placed: Array, observed: Points, landmarks: Points, tree: cKDTree
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """The nearest landmark (..., K) of points placed (..., K, 2) m in the world, and whether it is close enough."""
+    distance, nearest = tree.query(placed)
     reach = np.sqrt(
         np.trace(observed.covariance, axis1=1, axis2=2)
-        + np.trace(landmarks.covariance[nearest], axis1=1, axis2=2)
+        + np.trace(landmarks.covariance, axis1=1, axis2=2)[nearest]
     )
     # A hypothesis is as uncertain as the two points it rests on: twice the reach of the point itself.
     close = distance < 2 * _SIGMAS * reach
     close &= np.asarray(observed.kinds) == np.asarray(landmarks.kinds)[nearest]
+    return nearest, close
+
+
+def _pairs(pose: Array, observed: Points, landmarks: Points, tree: cKDTree) -> Ints:
+    """(P, 2) one-to-one pairs of observations and landmarks that lie within each other's reach."""
+    nearest, close = _nearest(pose[:2] + observed.xy @ rotation(pose[2]).T, observed, landmarks, tree)
     _, once = np.unique(nearest[close], return_index=True)
     rows = np.flatnonzero(close)[np.sort(once)]
     return np.stack([rows, nearest[rows]], -1)
 
 
-def _refine(pose: Array, observed: Points, landmarks: Points) -> Relocation:
-    """Weighted least squares over all pairs, by Gauss-Newton."""
+def _refine(pose: Array, observed: Points, landmarks: Points, tree: cKDTree) -> Relocation | None:
+    """Weighted least squares over all pairs, by Gauss-Newton; None if it loses them."""
     for _ in range(_ROUNDS):
-        pairs = _pairs(pose, observed, landmarks)
+        pairs = _pairs(pose, observed, landmarks, tree)
+        if len(pairs) < 2:
+            return None
         i, j = pairs.T
         z, H, R = to_sensor(pose, landmarks.xy[j])
         weights = np.linalg.inv(observed.covariance[i] + R @ landmarks.covariance[j] @ R.T)
@@ -111,6 +131,12 @@ def _refine(pose: Array, observed: Points, landmarks: Points) -> Relocation:
         pose = pose + np.linalg.solve(information, np.einsum("pki,pkl,pl->i", H, weights, observed.xy[i] - z))
         pose[2] = wrap(pose[2])
     return Relocation(pose, np.linalg.inv(information), pairs)
+
+
+def _unexplained(min_pairs: int, observed: Points) -> LostError:
+    return LostError(
+        f"No pose explains {min_pairs} of the {len(observed)} points seen: move on and try again."
+    )
 
 
 def _same(pose: Array, other: Array) -> bool:

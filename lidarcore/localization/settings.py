@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from lidarcore.localization.kernels import odometry_variances
 from lidarcore.scan import Array
 
 _CONFIG = ConfigDict(extra="forbid")
@@ -32,17 +33,16 @@ class OdometryNoise:
         float, _number(0, 1, "m/√rad", "standard deviation of the position after turning one radian")
     ] = 0.01
 
+    @property
+    def table(self) -> Array:
+        """(5,) the numbers as kernels take them."""
+        return np.array(
+            [self.along, self.across, self.heading_per_metre, self.heading_per_radian, self.slip_per_radian]
+        )
+
     def covariance(self, increment: Array) -> Array:
         """Covariance (3, 3) of an increment (3,) m, m, rad, in the sensor frame before the step."""
-        way, turn = float(np.hypot(increment[0], increment[1])), float(abs(increment[2]))
-        slip = self.slip_per_radian**2 * turn
-        return np.diag(
-            [
-                self.along**2 * way + slip,
-                self.across**2 * way + slip,
-                self.heading_per_metre**2 * way + self.heading_per_radian**2 * turn,
-            ]
-        )
+        return np.diag(odometry_variances(np.asarray(increment, np.float64), self.table))
 
 
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
@@ -50,6 +50,9 @@ class VelocityNoise:
     """White accelerations of the constant-velocity model."""
 
     acceleration: Annotated[float, _number(1e-4, 50, "m/s/√s", "change of the speed within a second")] = 0.5
+    sideways: Annotated[
+        float, _number(0, 50, "m/s/√s", "change of the speed sideways within a second; 0 if it never slides")
+    ] = 0.5
     turn_acceleration: Annotated[
         float, _number(1e-4, 50, "rad/s/√s", "change of the turn rate within a second")
     ] = 1.0
@@ -82,9 +85,22 @@ class LocalizationSettings:
         float, _number(1, 1e3, "", "a pair is ambiguous if it is not this many times likelier than another")
     ] = 10.0
     confirm: Annotated[int, Field(ge=1, le=1000, description="sightings that confirm a landmark")] = 4
+    settle: Annotated[
+        float, _number(0, 600, "s", "time from its first sighting before a landmark is confirmed")
+    ] = 1.0
     memory: Annotated[
         int, Field(ge=1, le=10000, description="sightings that count against views without it")
     ] = 10
+
+    unevenness: Annotated[
+        float,
+        _number(
+            0,
+            0.5,
+            "m",
+            "standard deviation of where a landmark seems to be from one place or another, beside noise",
+        ),
+    ] = 0.01
 
     @model_validator(mode="after")
     def _ordered(self) -> "LocalizationSettings":
@@ -94,3 +110,30 @@ class LocalizationSettings:
         if np.log(self.ambiguity) >= np.log((1 - self.gate) / (1 - self.new_gate)):
             raise ValueError("ambiguity is too large for these gates: lower it, or raise new_gate")
         return self
+
+
+@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+class NavigationSettings:
+    """What a Navigator does with each scan. Immutable; pydantic.ValidationError names a wrong field."""
+
+    mode: Annotated[
+        Literal["off", "localize", "slam"],
+        Field(description="localize in a map that is given, or build it at the same time"),
+    ] = "off"
+    landmarks: Annotated[
+        Literal["corners", "clusters"], Field(description="what of a scan is taken for landmarks")
+    ] = "corners"
+    motion: Annotated[
+        Literal["auto", "odometry", "constant velocity"],
+        Field(description="what predicts the pose between scans; auto: odometry when the source has it"),
+    ] = "auto"
+    max_width: Annotated[
+        float,
+        _number(
+            0.01,
+            10,
+            "m",
+            "wider clusters are no landmarks: the mean of a wall depends on how much of it is in view",
+        ),
+    ] = 0.5
+    filter: LocalizationSettings = field(default_factory=LocalizationSettings)

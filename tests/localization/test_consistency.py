@@ -5,9 +5,21 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from walks import PERIOD, POSTS, START_COVARIANCE, Walk, nees, sight, true_path, walk
+from walks import (
+    PERIOD,
+    POSTS,
+    SIGHT,
+    START_COVARIANCE,
+    Walk,
+    nees,
+    sight,
+    sighting,
+    true_path,
+    walk,
+)
 
 from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
+from lidarcore.localization.motion import motion_model
 from lidarcore.scan import Array
 
 RUNS, STEPS = 100, 120
@@ -50,4 +62,37 @@ def test_the_covariance_is_what_the_errors_show(
 ) -> None:
     inside = (BAND[0] <= (values := anees(run))) & (values <= BAND[1])
     print(inside.mean(), values.mean(), values[::10])
+    assert inside.mean() >= 0.9, f"{inside.mean():.0%} inside, mean ANEES {values.mean():.3f}"
+
+
+FREE = LocalizationSettings(motion="constant velocity")
+FREE_RUNS, FREE_STEPS, FREE_PERIOD = 60, 50, 0.1
+
+
+def float_and_map(rng: np.random.Generator) -> list[float]:
+    """Errors of one SLAM without odometry, of a sensor that moves as the model says, among posts in the open.
+
+    The first landmarks are tentative and correct the pose, for there are no others.
+    """
+    motion, noise = motion_model(FREE), FREE.velocity
+    start = np.array([6.0, 2.5, 0.3])
+    state = np.append(start, rng.normal(0, [noise.speed, noise.turn_rate, noise.speed]))
+    slam, errors = Slam(FREE, rng.multivariate_normal(start, START_COVARIANCE), START_COVARIANCE), []
+    for k in range(FREE_STEPS):
+        if k:
+            state, _, Q = motion.predict(state, FREE_PERIOD, None)
+            state = rng.multivariate_normal(state, Q)
+        near = np.linalg.norm(POSTS - state[:2], axis=1) < SIGHT
+        estimate = slam.step(sighting(rng, state[:3], POSTS[near]), FREE_PERIOD * k)
+        errors.append(nees(estimate.pose - state[:3], estimate.covariance))
+    return errors
+
+
+def test_without_odometry_the_covariance_is_what_the_errors_show_from_the_first_tentative_landmarks_on() -> (
+    None
+):
+    rng = np.random.default_rng(11)
+    values = np.mean([float_and_map(rng) for _ in range(FREE_RUNS)], axis=0) / 3
+    low, high = chi2.ppf([0.025, 0.975], 3 * FREE_RUNS) / (3 * FREE_RUNS)
+    inside = (low <= values) & (values <= high)
     assert inside.mean() >= 0.9, f"{inside.mean():.0%} inside, mean ANEES {values.mean():.3f}"

@@ -72,10 +72,12 @@ def test_the_measurement_is_range_and_bearing(pose: Array, landmark: Array) -> N
     )
 
 
-@given(poses, rates, tiny_rates, st.floats(0.01, 0.5))
-def test_jacobian_of_the_constant_velocity_model(pose: Array, v: float, w: float, dt: float) -> None:
+@given(poses, rates, tiny_rates, rates, st.floats(0.01, 0.5))
+def test_jacobian_of_the_constant_velocity_model(
+    pose: Array, v: float, w: float, u: float, dt: float
+) -> None:
     pose[2] = np.clip(pose[2], -0.9, 0.9)
-    model, state = ConstantVelocity(VelocityNoise()), np.array([*pose, v, w])
+    model, state = ConstantVelocity(VelocityNoise()), np.array([*pose, v, w, u])
     _, F, _ = model.predict(state, dt, None)
     np.testing.assert_allclose(F, jacobian(lambda s: model.predict(s, dt, None)[0], state), atol=1e-6)
 
@@ -83,17 +85,18 @@ def test_jacobian_of_the_constant_velocity_model(pose: Array, v: float, w: float
 def test_velocity_noise_is_that_of_many_small_random_accelerations() -> None:
     """Monte Carlo of the stochastic differential equation, with accelerations small enough to be linear."""
     rng, runs, steps, dt = np.random.default_rng(1), 20_000, 100, 0.4
-    noise = VelocityNoise(acceleration=0.02, turn_acceleration=0.02)
+    noise = VelocityNoise(acceleration=0.02, turn_acceleration=0.02, sideways=0.01)
     x, y, heading = np.zeros(runs), np.zeros(runs), np.full(runs, 0.7)
-    v, w = np.full(runs, 1.2), np.full(runs, 0.5)
+    v, w, u = np.full(runs, 1.2), np.full(runs, 0.5), np.full(runs, -0.3)
     for _ in range(steps):
         v += noise.acceleration * np.sqrt(dt / steps) * rng.normal(size=runs)
         w += noise.turn_acceleration * np.sqrt(dt / steps) * rng.normal(size=runs)
-        x += v * np.cos(heading) * dt / steps
-        y += v * np.sin(heading) * dt / steps
+        u += noise.sideways * np.sqrt(dt / steps) * rng.normal(size=runs)
+        x += (v * np.cos(heading) - u * np.sin(heading)) * dt / steps
+        y += (v * np.sin(heading) + u * np.cos(heading)) * dt / steps
         heading += w * dt / steps
-    _, _, Q = ConstantVelocity(noise).predict(np.array([0, 0, 0.7, 1.2, 0.5]), dt, None)
-    sampled = np.cov(np.stack([x, y, heading, v, w]))
+    _, _, Q = ConstantVelocity(noise).predict(np.array([0, 0, 0.7, 1.2, 0.5, -0.3]), dt, None)
+    sampled = np.cov(np.stack([x, y, heading, v, w, u]))
     sigma = np.sqrt(np.diag(sampled))
     np.testing.assert_allclose(Q / np.outer(sigma, sigma), sampled / np.outer(sigma, sigma), atol=0.04)
 

@@ -1,0 +1,227 @@
+"""One thing to drive: scans in, whereabouts out, in a known map or while building it."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lidarcore.clusters import Clusters
+from lidarcore.errors import LocalizationError, LostError, MotionError
+from lidarcore.features import Features
+from lidarcore.localization.continuity import Continuity
+from lidarcore.localization.deskew import deskew, skew
+from lidarcore.localization.estimate import Estimate, Instant, as_pose, no_innovation
+from lidarcore.localization.filters import Filter, make_filter
+from lidarcore.localization.landmarks import Landmarks
+from lidarcore.localization.motion import start
+from lidarcore.localization.points import Points
+from lidarcore.localization.reckoning import DeadReckoning, Velocity
+from lidarcore.localization.relocalization import relocalize
+from lidarcore.localization.settings import LocalizationSettings, NavigationSettings
+from lidarcore.localization.sightings import Sightings
+from lidarcore.localization.slam import Slam
+from lidarcore.localization.visibility import Visibility
+from lidarcore.localization.watch import Watch
+from lidarcore.localization.whereabouts import State, Whereabouts
+from lidarcore.scan import Array, Scan
+
+_ORIGIN = 1e-6 * np.eye(3)
+_NOWHERE = np.diag([10.0, 10.0, np.pi]) ** 2  # m², m², rad²: covariance of a pose of which nothing is known
+_DOUBT = 25.0  # the covariance of a pose found from a scan grows so much before the same scan corrects it
+_LATE = 10  # scans within which odometry may come: some recordings begin before it
+_RECOGNISABLE = 4  # confirmed landmarks, without which no pose is found in a map
+_NOTHING = Landmarks.of(Points(np.empty((0, 2)), np.eye(2)))
+_MESSAGES = {
+    "coasting": "No landmark is recognised: the pose is only predicted.",
+    "lost": "The pose is not to be trusted any more: it is looked for in the map.",
+}
+
+
+class Navigator:
+    """Tracks T_world_sensor over scans, and finds it again when it is lost.
+
+    landmarks         the map to localize in, or for SLAM to go on with; mode "localize" needs one
+    pose, covariance  (3,) m, m, rad and (3, 3) of the start. Without them SLAM starts at the origin of a new map,
+                      and in a known one the pose is found from the first scan that allows it
+
+    Raises LocalizationError if mode is "off", a map is missing, or pose or covariance is none.
+    """
+
+    def __init__(
+        self,
+        settings: NavigationSettings,
+        landmarks: Landmarks | Points | None = None,
+        pose: ArrayLike | None = None,
+        covariance: ArrayLike | None = None,
+    ) -> None:
+        if settings.mode == "off":
+            raise LocalizationError('Navigation is off: set mode to "localize" or "slam".')
+        self.mode, self.settings = settings.mode, settings
+        self._given = Landmarks.of(landmarks) if isinstance(landmarks, Points) else landmarks or _NOTHING
+        if self.mode == "localize" and not self._given.confirmed.any():
+            raise LocalizationError(
+                "There is no map to localize in: give its landmarks, or build it by SLAM."
+            )
+        self._filter: Filter | None = None
+        self._start: tuple[Array, Array]
+        self._estimate: Estimate
+        self._scans = 0
+        self._watch, self._reckoning = Watch(), DeadReckoning()
+        self._state: State = "starting"
+        self._deskewed: tuple[float, Velocity] = (np.nan, (0.0, 0.0, 0.0))  # stamp, and what was taken out
+        self._is_placed = pose is not None or len(self._given) == 0
+        nowhere = _ORIGIN if self._is_placed else _NOWHERE
+        self._set_start((0, 0, 0) if pose is None else pose, nowhere if covariance is None else covariance)
+
+    @property
+    def landmarks(self) -> Landmarks:
+        """The map as it is now."""
+        return self._given if self._filter is None else self._filter.map
+
+    def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
+        """Say by hand where the sensor is: T_world_sensor (3,) m, m, rad, with its covariance (3, 3).
+
+        Raises LocalizationError if the pose is not finite, CovarianceError if the covariance is not positive definite.
+        """
+        self._set_start(pose, covariance)
+        if self._filter is not None:
+            self._filter.reset(*self._start)
+            self._filter.restart_clock()
+        self._reckoning.place(self._estimate.pose)
+        self._is_placed = True
+        self._watch.restart()
+
+    def deskewed(self, scan: Scan) -> Scan:
+        """The scan without the distortion by the sensor's motion, as far as that is known.
+
+        `step` takes into account by which velocity, so features are to be found in the scan that this returns.
+        """
+        velocity = self._velocity(scan)
+        if velocity is None or scan.beam_times is None or not np.isfinite(scan.beam_times).all():
+            return scan
+        self._deskewed = scan.stamp, velocity
+        return deskew(scan, *velocity)
+
+    def step(
+        self,
+        scan: Scan,
+        features: Features,
+        clusters: Clusters | None = None,
+        odometry: ArrayLike | None = None,
+    ) -> Whereabouts:
+        """Take one scan with what was found in it; odometry is T_odom_sensor (3,), by default that of the scan.
+
+        A scan whose clock went back, or whose odometry is missing, not finite or has jumped, is left out, and the
+        message says so; once a few agree with each other it goes on from the new values.
+        Raises LocalizationError if the settings ask for clusters and there are none.
+        """
+        sightings = Sightings.of(scan, features, clusters, self.settings)
+        odometry = scan.odometry if odometry is None else odometry
+        before = self.landmarks
+        try:
+            now = Instant(scan.stamp, None if odometry is None else np.asarray(odometry, np.float64))
+            message = self._advance(now, sightings, scan, before)
+        except LocalizationError as error:
+            message = f"{_fact(error)}: the scan was left out."
+            self._estimate = self._estimate.unmoved(len(sightings.points))
+        return Whereabouts.of(
+            scan.stamp,
+            self.mode,
+            self._state,
+            message,
+            self._estimate,
+            sightings.points,
+            before,
+            self.landmarks,
+            self._reckoning.pose,
+        )
+
+    def _advance(self, now: Instant, sightings: Sightings, scan: Scan, before: Landmarks) -> str | None:
+        """Step the filter, across a break of clock or odometry if need be; what is to be said about it."""
+        running, message = self._running(now), None
+        if not self._is_placed and (trouble := self._find(running, sightings.points, before)):
+            pose, seen = self._estimate.pose, len(sightings.points)
+            self._estimate = Estimate(now.stamp, pose, _NOWHERE, None, no_innovation(seen))
+            self._reckoning.carry(now, pose)
+            return trouble
+        try:
+            estimate = self._estimated(running, now, sightings, scan)
+        except MotionError as error:
+            bridge = self._continuity.reject(now)
+            if bridge is None:
+                raise
+            running.displace(bridge.increment, bridge.covariance)
+            self._reckoning.interrupt()
+            estimate = self._estimated(running, now, sightings, scan)
+            message = f"{_fact(error)}: it goes on from the new values."
+        self._continuity.accept(now)
+        self._reckoning.carry(now, self._estimate.pose)
+        self._estimate = estimate
+        return self._judge(running, before) or message
+
+    def _running(self, now: Instant) -> Filter:
+        """The filter; made at the first scan, and again if odometry comes soon after."""
+        has_odometry = now.odometry is not None
+        if self._filter is None or (
+            has_odometry
+            and self._scans < _LATE
+            and self.settings.motion == "auto"
+            and self._filter.settings.motion != "odometry"
+        ):
+            self._filter = make_filter(self.settings, has_odometry, *self._start, self._given)
+            self._continuity = Continuity(self._filter.settings)
+        self._scans += 1
+        return self._filter
+
+    def _find(self, running: Filter, observed: Points, known: Landmarks) -> str | None:
+        """Look for the pose in the map; what is to be said if it is not found."""
+        try:
+            found = relocalize(observed, known.subset(known.confirmed).points)
+        except LostError as error:
+            return str(error)
+        running.reset(found.pose, _DOUBT * found.covariance)
+        running.restart_clock()
+        self._is_placed, self._state = True, "tracking"
+        self._watch.restart()
+        return None
+
+    def _estimated(self, running: Filter, now: Instant, sightings: Sightings, scan: Scan) -> Estimate:
+        """One step of the filter with what was seen, as it was seen."""
+        points, times = sightings.points, sightings.times
+        if running.settings.motion == "odometry":
+            times = None  # it has no velocity that could be corrected
+            if scan.beam_times is not None and self._velocity(scan) is None:
+                points = points.subset(np.zeros(len(points), np.bool_))  # who knows how distorted they are
+        if times is not None:
+            stamp, velocity = self._deskewed
+            points = skew(points, times, *(velocity if stamp == scan.stamp else (0.0, 0.0, 0.0)))
+        return running.step(points, now.stamp, now.odometry, Visibility(scan), times)
+
+    def _judge(self, running: Filter, before: Landmarks) -> str | None:
+        """Set the state after a step; what is to be said about it."""
+        state = self._watch.judge(self._estimate, running.is_at_odds)
+        known = np.count_nonzero(before.confirmed)
+        if state == "lost" and known < _RECOGNISABLE and isinstance(running, Slam):
+            running.start_over(self._estimate.pose, _ORIGIN)
+            self._watch.restart()
+            self._state = "starting"
+            return "There are too few landmarks to keep the pose: a new map is begun."
+        if self._state == "starting" and not known:
+            return None
+        self._state = state
+        self._is_placed = state != "lost"
+        return _MESSAGES.get(state)
+
+    def _velocity(self, scan: Scan) -> Velocity | None:
+        """As the filter or else odometry has it."""
+        if self._estimate.velocity is None:
+            return self._reckoning.velocity(scan)
+        v, w = self._estimate.velocity.tolist()
+        return v, w, self._estimate.sideways
+
+    def _set_start(self, pose: ArrayLike, covariance: ArrayLike) -> None:
+        self._start = start(as_pose(pose, "pose"), covariance, LocalizationSettings())
+        self._estimate = Estimate(0.0, *self._start, None, no_innovation(0))
+
+
+def _fact(error: LocalizationError) -> str:
+    """What was found, without what a caller of the filter could do about it."""
+    return str(error).partition(":")[0]
