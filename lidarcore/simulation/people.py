@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from lidarcore.errors import SimulationError
 from lidarcore.scan import Array
+from lidarcore.simulation.posts import distances_to_circles
 from lidarcore.simulation.rooms import random_pose
 from lidarcore.simulation.world import World
 
@@ -16,10 +18,11 @@ _SENSOR = 0.6  # m between the middle and where the sensor is at any time
 _SPEED = (1.1, 0.15)  # m/s, mean and standard deviation from walk to walk
 _SHORT = 1.0  # m, shortest walk
 _REST = 4.0  # s that someone stands before walking on, at most
+_TRIES = 2000
 
 
 class Person:
-    """Someone who walks straight from one spot of the furnished room to another, stands a little, and walks on.
+    """Someone who walks straight from one spot of a world to another, stands a little, and walks on.
 
     avoid (P, 2) m, world frame: points to keep clear of, such as the path of the sensor.
     """
@@ -54,11 +57,12 @@ class Person:
 
     def _next_spot(self, here: Array | None) -> Array:
         """A random spot with a clear way to it; any clear spot to begin with."""
-        while True:
+        for _ in range(_TRIES):
             spot = random_pose(self._world, self._rng, _WALL)[:2]
             start = spot if here is None else here
             if (here is None or np.hypot(*(spot - start)) > _SHORT) and self._is_clear(start, spot):
                 return spot
+        raise SimulationError("Nobody can walk here: walls and the sensor's path leave too little room.")
 
     def _is_clear(self, start: Array, end: Array) -> bool:
         steps = int(np.hypot(*(end - start)) / 0.1) + 1
@@ -72,10 +76,4 @@ def distances_to_legs(legs: Array, positions: Array, directions: Array) -> Array
 
     legs (L, N, 2), positions (N, 2) m, directions (N, 2) unit vectors, all in the world frame.
     """
-    to_leg = legs - positions
-    along = (to_leg * directions).sum(-1)
-    aside = to_leg[..., 0] * directions[:, 1] - to_leg[..., 1] * directions[:, 0]
-    half_chord = np.sqrt(np.maximum(LEG**2 - aside**2, 0))
-    meets = (half_chord > 0) & (along > half_chord)
-    distances: Array = np.where(meets, along - half_chord, np.inf).min(axis=0, initial=np.inf)
-    return distances
+    return distances_to_circles(legs, LEG, positions, directions)

@@ -9,32 +9,42 @@ from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array
 from lidarcore.simulation.paths import Path
 from lidarcore.simulation.people import Person, distances_to_legs
+from lidarcore.simulation.posts import Posts
 from lidarcore.simulation.world import World
 
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Walls, who walks between them, and where the sensor is."""
+    """Walls and posts, who walks between them, and where the sensor is."""
 
     world: World
     path: Path
     people: Sequence[Person] = ()
+    posts: Posts | None = None
 
     def cast(self, times: Array, bearings: Array) -> tuple[Array, Array]:
         """True ranges (N,) m, NaN for none, of beams at growing times (N,) s and bearings (N,) rad, sensor frame.
 
-        Beside them the sine (N,) of the angle at which each beam meets its wall; 1 for a leg.
+        Beside them the sine (N,) of the angle at which each beam meets its wall; 1 for what is round.
         """
         poses = self.path(times)
         ranges, hit = self.world.cast(poses, bearings)
         directions = np.exp(1j * (bearings + poses[:, 2])).view(float).reshape(-1, 2)
         sines = _sines(self.world.walls[hit], directions)
+        distances = self._to_round(times, poses[:, :2], directions)
+        nearer = distances < np.where(np.isnan(ranges), np.inf, ranges)
+        ranges, sines = np.where(nearer, distances, ranges), np.where(nearer, 1.0, sines)
+        return ranges, sines
+
+    def _to_round(self, times: Array, positions: Array, directions: Array) -> Array:
+        """Distance (N,) m to the nearest leg or post, inf for none."""
+        distances = np.full(len(times), np.inf)
         if self.people:
             legs = np.concatenate([person.legs(times) for person in self.people])
-            distances = distances_to_legs(legs, poses[:, :2], directions)
-            nearer = distances < np.where(np.isnan(ranges), np.inf, ranges)
-            ranges, sines = np.where(nearer, distances, ranges), np.where(nearer, 1.0, sines)
-        return ranges, sines
+            distances = distances_to_legs(legs, positions, directions)
+        if self.posts is not None:
+            distances = np.minimum(distances, self.posts.distances(positions, directions))
+        return distances
 
 
 @dataclass(frozen=True, slots=True)
