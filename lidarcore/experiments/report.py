@@ -1,0 +1,66 @@
+"""Reports of experiments: one HTML page each, complete in itself, by day and by night, on paper and on a phone."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+_STYLE = Path(__file__).with_suffix(".css")
+
+
+def page(title: str, lead: str, sections: Sequence[tuple[str, str]]) -> str:
+    """A page of sections: heading and HTML each."""
+    body = "".join(f"<section><h2>{escape(heading)}</h2>{html}</section>" for heading, html in sections)
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<title>{escape(title)}</title><style>{_STYLE.read_text('utf-8')}</style></head>"
+        f'<body><h1>{escape(title)}</h1><p class="lead">{escape(lead)}</p>{body}</body></html>\n'
+    )
+
+
+def paragraphs(*texts: str) -> str:
+    """Plain paragraphs."""
+    return "".join(f"<p>{escape(text)}</p>" for text in texts)
+
+
+def bullets(texts: Sequence[str]) -> str:
+    """A plain list."""
+    return "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in texts) + "</ul>"
+
+
+def table(caption: str, headers: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> str:
+    """A table of numbers; the first `texts` columns are words."""
+
+    def cells(tag: str, row: Sequence[str]) -> str:
+        return "".join(
+            f"<{tag}{' class=text' if i < texts else ''}>{escape(cell)}</{tag}>" for i, cell in enumerate(row)
+        )
+
+    body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
+    return _wide(f"<caption>{escape(caption)}</caption><tr>{cells('th', headers)}</tr>{body}")
+
+
+def verdicts(rows: Sequence[tuple[str, str, bool | None]]) -> str:
+    """Claims beside what was measured, and whether it agrees (None: open)."""
+    words = {True: ("agrees", "agrees"), False: ("differs", "differs"), None: ("text", "open")}
+    body = "".join(
+        f'<tr><td class="prose">{escape(claim)}</td><td class="prose">{escape(measured)}</td>'
+        f'<td class="{words[agrees][0]}">{words[agrees][1]}</td></tr>'
+        for claim, measured, agrees in rows
+    )
+    head = "".join(f'<th class="text">{name}</th>' for name in ("the paper says", "measured here", ""))
+    return f'<table class="claims"><tr>{head}</tr>{body}</table>'
+
+
+def figure(caption: str, panels: Sequence[tuple[str, str]], legend: Sequence[tuple[str, str]] = ()) -> str:
+    """Panels (title, SVG) beside each other, a legend of names and CSS colours, and a caption."""
+    drawn = "".join(f"<div>{f'<p>{escape(title)}</p>' if title else ''}{svg}</div>" for title, svg in panels)
+    keys = "".join(f'<span style="--of: {colour}">{escape(name)}</span>' for name, colour in legend)
+    keys = f'<p class="legend">{keys}</p>' if keys else ""
+    return (
+        f'<figure>{keys}<div class="panels">{drawn}</div><figcaption>{escape(caption)}</figcaption></figure>'
+    )
+
+
+def _wide(rows: str) -> str:
+    return f'<div class="wide" tabindex="0"><table>{rows}</table></div>'
