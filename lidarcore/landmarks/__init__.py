@@ -1,14 +1,16 @@
-"""Landmarks that outlive a run: an embedded database with spatial queries, and exchange with other programs."""
+"""Landmarks that outlive a run: an embedded database of maps with spatial queries, and exchange with other programs."""
 
+from lidarcore.landmarks.atlas import Atlas, Session
 from lidarcore.landmarks.exchange import FORMATS, export_map, import_map, read_landmarks, write_landmarks
 from lidarcore.landmarks.landmark import Landmark
+from lidarcore.landmarks.landmark_map import LandmarkMap
 from lidarcore.landmarks.nearest import Metric, Neighbour
 from lidarcore.landmarks.picture import export_picture
 from lidarcore.landmarks.queries import Box, Circle, Filter, Page
-from lidarcore.landmarks.store import LandmarkMap, Session, State
 
 __all__ = [
     "FORMATS",
+    "Atlas",
     "Box",
     "Circle",
     "Filter",
@@ -18,7 +20,6 @@ __all__ = [
     "Neighbour",
     "Page",
     "Session",
-    "State",
     "export_map",
     "export_picture",
     "import_map",

@@ -1,8 +1,9 @@
 """The SQLite file under a landmark map: schema and its versions, connections, transactions, errors.
 
 Write-ahead logging lets readers go on while one connection writes; with synchronous=FULL a transaction that
-returned is on the disk. Position and uncertainty are kept in an R*Tree, too: a landmark spans from 0 to its sigma
-along the third axis, so that a node tells how uncertain the landmarks in it may be.
+returned is on the disk. Position, uncertainty and session are kept in an R*Tree, too: a landmark spans from 0 to its
+sigma along the third axis, so that a node tells how uncertain the landmarks in it may be, and half a session along
+the fourth, since a tree over nodes without extent would not know how to split them.
 """
 
 import sqlite3
@@ -12,11 +13,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Lock
 
-from lidarcore.errors import LandmarkMapError
+from lidarcore.errors import LandmarkError, LandmarkMapError
 
 UNIT = "m"
 _APPLICATION = 0x4C4D4150  # "LMAP", in the header of the file
-_BUSY_SECONDS = 10.0
+PATIENCE = 10.0  # s to wait while another process writes
 
 # What brings a file from each version to the next; a new version is appended and none is ever edited.
 _MIGRATIONS: tuple[tuple[str, ...], ...] = (
@@ -43,14 +44,44 @@ _MIGRATIONS: tuple[tuple[str, ...], ...] = (
             first_seen REAL NOT NULL, last_seen REAL NOT NULL,
             PRIMARY KEY (landmark, second)) STRICT, WITHOUT ROWID""",
     ),
+    (  # each session is a map of its own
+        "ALTER TABLE sessions ADD COLUMN mode TEXT NOT NULL DEFAULT ''",
+        """INSERT INTO sessions (source, started, ended)
+            SELECT 'before sessions', min(first_seen), max(last_seen) FROM history HAVING count(*) > 0""",
+        "ALTER TABLE landmarks ADD COLUMN session INTEGER NOT NULL DEFAULT 0",
+        "UPDATE landmarks SET session = (SELECT max(id) FROM sessions)",
+        "CREATE INDEX landmarks_by_session ON landmarks (session)",
+        "DROP TABLE places",
+        """CREATE VIRTUAL TABLE places USING rtree(
+            id, x_min, x_max, y_min, y_max, sigma_min, sigma_max, session_min, session_max)""",
+        "INSERT INTO places SELECT id, x, x, y, y, 0, sigma, session, session + 0.5 FROM landmarks",
+        "DROP TABLE extent",
+        # Bounds of all that ever was in a session: only ever wider than need be. Deleted last with its session.
+        """CREATE TABLE extents (
+            session INTEGER PRIMARY KEY, x_min REAL NOT NULL, x_max REAL NOT NULL, y_min REAL NOT NULL,
+            y_max REAL NOT NULL, sigma_min REAL NOT NULL, sigma_max REAL NOT NULL) STRICT""",
+        """INSERT INTO extents SELECT session, min(x), max(x), min(y), max(y), min(sigma), max(sigma)
+            FROM landmarks GROUP BY session""",
+        "ALTER TABLE history RENAME TO old_history",
+        """CREATE TABLE history (
+            landmark INTEGER NOT NULL, second INTEGER NOT NULL, session INTEGER NOT NULL,
+            x REAL NOT NULL, y REAL NOT NULL, var_x REAL NOT NULL, cov_xy REAL NOT NULL, var_y REAL NOT NULL,
+            kind TEXT NOT NULL, method TEXT NOT NULL, count INTEGER NOT NULL,
+            first_seen REAL NOT NULL, last_seen REAL NOT NULL,
+            PRIMARY KEY (landmark, second)) STRICT, WITHOUT ROWID""",
+        """INSERT INTO history SELECT landmark, second, (SELECT max(id) FROM sessions), x, y, var_x, cov_xy, var_y,
+            kind, method, count, first_seen, last_seen FROM old_history""",
+        "DROP TABLE old_history",
+        "CREATE INDEX history_by_session ON history (session)",
+    ),
 )
 
 
 class Database:
     """Connections to one file: one that writes, and as many that read as there are readers at a time."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
+    def __init__(self, path: Path, patience: float = PATIENCE) -> None:
+        self.path, self._patience = path, patience
         self._lock = Lock()
         self._closed = False
         self._idle: deque[sqlite3.Connection] = deque()
@@ -101,9 +132,8 @@ class Database:
             raise LandmarkMapError(f"The landmark map {self.path} is closed.")
         with self._explained():
             connection = sqlite3.connect(
-                self.path, _BUSY_SECONDS, isolation_level=None, check_same_thread=False
+                self.path, self._patience, isolation_level=None, check_same_thread=False
             )
-            connection.execute("PRAGMA foreign_keys = ON")
             connection.execute("PRAGMA synchronous = FULL")
             connection.execute("PRAGMA mmap_size = 1000000000")
             return connection
@@ -140,6 +170,8 @@ class Database:
             yield
         except sqlite3.Error as error:
             raise LandmarkMapError(f"The landmark map {self.path} cannot be used: {error}.") from error
+        except OverflowError as error:
+            raise LandmarkError("A number has more than 64 bits: no id is so large.") from error
 
 
 def path_of(url: str | Path) -> Path:

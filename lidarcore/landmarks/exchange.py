@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TextIO
 
-from lidarcore.errors import LandmarkError, LandmarkMapError
+from lidarcore.errors import LandmarkError, MapFileError
 from lidarcore.landmarks.landmark import COLUMNS, Landmark
-from lidarcore.landmarks.store import LandmarkMap
+from lidarcore.landmarks.landmark_map import LandmarkMap
 
 Row = dict[str, Any]
 
@@ -36,7 +36,7 @@ _CSV_TYPES: dict[str, Callable[[str], Any]] = {"id": int, "count": int, **dict.f
 def export_map(landmark_map: LandmarkMap, path: str | Path) -> None:
     """Write all landmarks; the suffix (.json, .csv, .geojson) says the format. The file appears when complete.
 
-    Raises LandmarkMapError for another suffix or a file that cannot be written.
+    Raises MapFileError for another suffix or a file that cannot be written.
     """
     path = Path(path)
     name, partial = _format(path), path.with_name(f".{path.name}.part")
@@ -49,17 +49,15 @@ def export_map(landmark_map: LandmarkMap, path: str | Path) -> None:
             partial.unlink(missing_ok=True)
 
 
-def import_map(landmark_map: LandmarkMap, path: str | Path, replace: bool = False) -> list[int]:
-    """Add the landmarks of a file under new ids, or `replace` the map by them, with the file's ids; the ids.
+def import_map(landmark_map: LandmarkMap, path: str | Path) -> list[int]:
+    """Add the landmarks of a file under new ids; the ids.
 
-    Nothing is changed unless every landmark is good. Raises LandmarkMapError if the file cannot be read, is of
-    another format, version or unit, or holds a landmark that makes no sense, which the message names.
+    Nothing is changed unless every landmark is good. Raises MapFileError if the file cannot be read, is of another
+    format, version or unit, or holds a landmark that makes no sense, which the message names.
     """
     path = Path(path)
     with _explained(path.name), path.open(encoding="utf-8-sig", newline="") as file:
         landmarks = list(read_landmarks(file, _format(path)))
-    if replace:
-        return landmark_map.replace(landmarks)
     return landmark_map.put(dataclasses.replace(landmark, id=None) for landmark in landmarks)
 
 
@@ -69,17 +67,15 @@ def write_landmarks(landmarks: Iterable[Landmark], file: TextIO, name: str) -> N
 
 
 def read_landmarks(file: TextIO, name: str) -> Iterator[Landmark]:
-    """Landmarks of a text file in one of FORMATS; raises LandmarkMapError."""
+    """Landmarks of a text file in one of FORMATS; raises MapFileError."""
     with _explained(f"This {name}"):
         for number, row in enumerate(FORMATS[name].read(file), 1):
             if wrong := (_REQUIRED - set(row)) | (set(row) - set(COLUMNS)):
-                raise LandmarkMapError(
-                    f"Landmark {number} lacks or has beyond need: {', '.join(sorted(wrong))}."
-                )
+                raise MapFileError(f"Landmark {number} lacks or has beyond need: {', '.join(sorted(wrong))}.")
             try:
                 yield Landmark(**row)
             except LandmarkError as error:
-                raise LandmarkMapError(f"Landmark {number}: {error}") from error
+                raise MapFileError(f"Landmark {number}: {error}") from error
 
 
 def _write_csv(rows: Iterable[Row], file: TextIO) -> None:
@@ -93,7 +89,7 @@ def _read_csv(file: TextIO) -> Iterator[Row]:
     header = next(reader, [])
     names = {csv_name: name for name, csv_name in _CSV_NAMES.items()}
     if unknown := [name for name in header or [""] if name not in names]:
-        raise LandmarkMapError(f"Columns {unknown} are none of {list(names)}: name and convert them so.")
+        raise MapFileError(f"Columns {unknown} are none of {list(names)}: name and convert them so.")
     for values in reader:
         texts = dict(zip((names[name] for name in header), values, strict=True))
         yield {
@@ -121,9 +117,7 @@ def _read_geojson(file: TextIO) -> Iterator[Row]:
                 {"id": feature["id"]} if "id" in feature else {}
             )
         except (KeyError, TypeError) as error:
-            raise LandmarkMapError(
-                f"This is no Point with properties: {json.dumps(feature)[:200]}"
-            ) from error
+            raise MapFileError(f"This is no Point with properties: {json.dumps(feature)[:200]}") from error
 
 
 def _feature(row: Row) -> Row:
@@ -146,12 +140,12 @@ def _items(file: TextIO, key: str) -> list[Row]:
     """The items of such a JSON object, if it is one of this format, version and unit."""
     document = json.load(file)
     if not isinstance(document, dict):
-        raise LandmarkMapError(f"This holds no object with {key}: export a map to see what is expected.")
+        raise MapFileError(f"This holds no object with {key}: export a map to see what is expected.")
     if (head := {name: document.get(name) for name in _HEADER}) != _HEADER:
-        raise LandmarkMapError(f"This says {head}, expected is {_HEADER}: convert it, or update lidarcore.")
+        raise MapFileError(f"This says {head}, expected is {_HEADER}: convert it, or update lidarcore.")
     items = document.get(key)
     if not (isinstance(items, list) and all(isinstance(item, dict) for item in items)):
-        raise LandmarkMapError(f"{key} is no list of objects.")
+        raise MapFileError(f"{key} is no list of objects.")
     return items
 
 
@@ -173,7 +167,7 @@ FORMATS = {
 def _format(path: Path) -> str:
     name = path.suffix.lower().removeprefix(".")
     if name not in FORMATS:
-        raise LandmarkMapError(f"{path.name} should end in .{', .'.join(FORMATS)}, which says the format.")
+        raise MapFileError(f"{path.name} should end in .{', .'.join(FORMATS)}, which says the format.")
     return name
 
 
@@ -182,4 +176,4 @@ def _explained(what: str) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, csv.Error, RecursionError) as error:
-        raise LandmarkMapError(f"{what} cannot be read or written: {error}.") from error
+        raise MapFileError(f"{what} cannot be read or written: {error}.") from error

@@ -37,19 +37,26 @@ class Neighbour:
 
 
 class Neighbourhood:
-    """What is about a point (m) of a certain covariance (m²) in a map, of the landmarks that pass the filter."""
+    """What is about a point (m) of a certain covariance (m²) in a session, of the landmarks that pass the filter."""
 
     def __init__(
-        self, connection: sqlite3.Connection, xy: tuple[float, float], covariance: Covariance, which: Filter
+        self,
+        connection: sqlite3.Connection,
+        session: int,
+        xy: tuple[float, float],
+        covariance: Covariance,
+        which: Filter,
     ) -> None:
         self._connection = connection
         self._xy = xy
         self._variance = largest_variance(*covariance)
-        self._filter, parameters = which.clauses()
+        of_session = ("landmarks.session = :session", {"session": session})
+        self._filter, parameters = joined([of_session, which.clauses()])
         names = ("cx", "cy", "r_xx", "r_xy", "r_yy")
         self._parameters = parameters | dict(zip(names, (*xy, *covariance), strict=True))
-        extent: tuple[float, ...] = connection.execute("SELECT * FROM extent").fetchone()
-        self._bounds, self._sigmas, self._max_sigma = extent[:4], extent[4:], which.max_sigma
+        query = "SELECT * FROM extents WHERE session = ?"
+        extent = connection.execute(query, (session,)).fetchone() or (session, *6 * (0.0,))
+        self._bounds, self._sigmas, self._max_sigma = extent[1:5], extent[5:], which.max_sigma
 
     def nearest(self, k: int, within: float, metric: Metric) -> list[Neighbour]:
         """The k nearest, at most `within` away, nearest first."""
@@ -78,12 +85,12 @@ class Neighbourhood:
 
     def _are_few(self) -> bool:
         """True if so few landmarks pass the filter that looking at each is quickest."""
-        query = f"SELECT count(*) FROM (SELECT 1 FROM landmarks WHERE {self._filter or 'true'} LIMIT {_FEW})"
+        query = f"SELECT count(*) FROM (SELECT 1 FROM landmarks WHERE {self._filter} LIMIT {_FEW})"
         return int(self._connection.execute(query, self._parameters).fetchone()[0]) < _FEW
 
     def _nearest_of_all(self, k: int, within: float, metric: Metric) -> list[Neighbour]:
         """Without the R*Tree."""
-        where = f"{self._filter or 'true'} AND {_ORDER} LIMIT {k}"
+        where = f"{self._filter} AND {_ORDER} LIMIT {k}"
         query = f"SELECT {SELECTED}, {_SQUARED[metric]} AS squared FROM landmarks WHERE {where}"
         return _neighbours(self._connection.execute(query, self._parameters | {"within": within}))
 

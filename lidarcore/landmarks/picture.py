@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from lidarcore.errors import LandmarkMapError
-from lidarcore.landmarks.store import LandmarkMap
+from lidarcore.errors import MapFileError
+from lidarcore.landmarks.landmark_map import LandmarkMap
 
 _UNKNOWN, _OCCUPIED = 205, 0  # grey values as ROS map_server writes them
 _MARGIN = 1.0  # m around the landmarks
@@ -16,22 +16,20 @@ _MOST_PIXELS = 100_000_000
 def export_picture(landmark_map: LandmarkMap, path: str | Path, resolution: float = 0.05) -> None:
     """Write a PNG and beside it the YAML of ROS map_server: a cell that holds a landmark is occupied, others unknown.
 
-    resolution is in m a pixel. Raises LandmarkMapError for another suffix than .png, an empty map, a resolution that
+    resolution is in m a pixel. Raises MapFileError for another suffix than .png, an empty map, a resolution that
     makes no picture or too large a one, or files that cannot be written.
     """
     path, extent = Path(path), landmark_map.extent()
     if path.suffix.lower() != ".png":
-        raise LandmarkMapError(f"{path.name} should end in .png.")
+        raise MapFileError(f"{path.name} should end in .png.")
     if extent is None:
-        raise LandmarkMapError("The map is empty: there is nothing to draw.")
+        raise MapFileError("The map is empty: there is nothing to draw.")
     if not 1e-3 <= resolution <= 1e3:
-        raise LandmarkMapError(f"The resolution is {resolution} m: give 0.001 to 1000 m a pixel.")
+        raise MapFileError(f"The resolution is {resolution} m: give 0.001 to 1000 m a pixel.")
     origin = np.floor((np.array([extent.x_min, extent.y_min]) - _MARGIN) / resolution) * resolution
     size = np.ceil((np.array([extent.x_max, extent.y_max]) + _MARGIN - origin) / resolution).astype(np.int64)
     if size.prod() > _MOST_PIXELS:
-        raise LandmarkMapError(
-            f"The picture would have {size[0]} x {size[1]} pixels: give a coarser resolution."
-        )
+        raise MapFileError(f"The picture would have {size[0]} x {size[1]} pixels: give a coarser resolution.")
     xy = np.array([(landmark.x, landmark.y) for landmark in landmark_map])
     column, row = np.floor((xy - origin) / resolution).astype(np.int64).T
     grey = np.full((size[1], size[0]), _UNKNOWN, np.uint8)
@@ -40,7 +38,7 @@ def export_picture(landmark_map: LandmarkMap, path: str | Path, resolution: floa
         Image.fromarray(grey).save(path)
         path.with_suffix(".yaml").write_text(_yaml(path.name, resolution, origin.tolist()), encoding="utf-8")
     except OSError as error:
-        raise LandmarkMapError(f"{path} cannot be written: {error}.") from error
+        raise MapFileError(f"{path} cannot be written: {error}.") from error
 
 
 def _yaml(image: str, resolution: float, origin: list[float]) -> str:

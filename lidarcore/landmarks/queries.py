@@ -18,7 +18,10 @@ Clauses = tuple[str, Parameters]  # SQL, and the values of its names
 MOST = 10_000  # landmarks in one answer
 _MANY = 5_000  # a region that holds more is read from the table in the order of ids
 SELECTED = ", ".join(f"landmarks.{name}" for name in COLUMNS)
-IN_BOX = "x_max >= :x0 AND x_min <= :x1 AND y_max >= :y0 AND y_min <= :y1"
+IN_BOX = (
+    "x_max >= :x0 AND x_min <= :x1 AND y_max >= :y0 AND y_min <= :y1 "
+    "AND session_max >= :session AND session_min <= :session"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,17 +138,27 @@ class Page:
 
 
 def find(
-    connection: sqlite3.Connection, region: Box | Circle | None, filter_: Filter, after: int, limit: int
+    connection: sqlite3.Connection,
+    session: int,
+    region: Box | Circle | None,
+    filter_: Filter,
+    after: int,
+    limit: int,
 ) -> Page:
-    """Landmarks in the region (None: anywhere) with ids above `after`, at most `limit`."""
+    """Landmarks of a session in the region (None: anywhere) with ids above `after`, at most `limit`."""
     check_limit("limit", limit)
     as_integer(after, "after")
-    conditions = [filter_.clauses(), ("landmarks.id > :after", {"after": after})]
+    conditions, of_session = (
+        [filter_.clauses(), ("landmarks.id > :after", {"after": after})],
+        "landmarks.session",
+    )
     if region is not None:
         conditions.append(region.exactly())
-        if _count(connection, region.bounds, _MANY) < _MANY:
+        if _count(connection, session, region.bounds, _MANY) < _MANY:
             inside = f"landmarks.id IN (SELECT id FROM places WHERE {IN_BOX} AND id > :after)"
             conditions.append((inside, region.bounds.parameters))
+            of_session = "+landmarks.session"  # the + keeps SQLite from walking through the whole session
+    conditions.append((f"{of_session} = :session", {"session": session}))
     where, parameters = joined(conditions)
     rows = connection.execute(
         f"SELECT {SELECTED} FROM landmarks WHERE {where} ORDER BY landmarks.id LIMIT :limit",
@@ -155,10 +168,11 @@ def find(
     return Page(landmarks, landmarks[-1].id if len(rows) > limit else None)
 
 
-def _count(connection: sqlite3.Connection, box: Box, most: int) -> int:
+def _count(connection: sqlite3.Connection, session: int, box: Box, most: int) -> int:
     """How many landmarks there are about the box, counted up to `most`."""
     query = f"SELECT count(*) FROM (SELECT 1 FROM places WHERE {IN_BOX} LIMIT :most)"
-    return int(connection.execute(query, box.parameters | {"most": most}).fetchone()[0])
+    parameters = box.parameters | {"session": session, "most": most}
+    return int(connection.execute(query, parameters).fetchone()[0])
 
 
 def joined(conditions: Iterable[Clauses]) -> Clauses:

@@ -10,10 +10,9 @@ from PIL import Image
 from pyarrow import csv as arrow
 from ruamel.yaml import YAML
 
-from lidarcore.errors import LandmarkMapError
+from lidarcore.errors import MapFileError
 from lidarcore.landmarks import (
     FORMATS,
-    LandmarkMap,
     export_map,
     export_picture,
     import_map,
@@ -28,26 +27,23 @@ CSV_HEAD = "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind"
 
 @pytest.fixture
 def filled(landmark_map):
-    landmark_map.put(RandomLandmarks(300).landmarks())
+    ids = landmark_map.put(RandomLandmarks(300).landmarks())
     landmark_map.put([corner(0.1 + 0.2, -1e-17, kind='Eck "Süd", 2; 角', method="")])
-    landmark_map.remove([5, 6])
+    landmark_map.remove(ids[4:6])
     return landmark_map
 
 
 @pytest.mark.parametrize("name", FORMATS)
-def test_what_was_exported_is_imported_to_the_last_bit(filled, tmp_path, name):
+def test_what_was_exported_is_imported_to_the_last_bit(atlas, filled, tmp_path, name):
     path = tmp_path / f"map.{name}"
     export_map(filled, path)
-    with LandmarkMap(tmp_path / "other.db") as other:
-        other.put([corner(-7, -7)])
-        ids = import_map(other, path)
-        assert [replace(m, id=None) for m in other] == [
-            replace(m, id=None) for m in (corner(-7, -7), *filled)
-        ]
-        assert ids == list(range(2, 301))
-        assert import_map(other, path, replace=True) == [landmark.id for landmark in filled]
-        assert list(other) == list(filled)
-        assert other.nearest((1, 1), 5) == filled.nearest((1, 1), 5)
+    other = atlas.begin(path.name, 5.0, "import")
+    other.put([corner(-7, -7)])
+    ids = import_map(other, path)
+    assert len(set(ids)) == len(filled) == 299
+    assert ids == [m.id for m in other][1:]
+    assert [replace(m, id=None) for m in other] == [replace(m, id=None) for m in (corner(-7, -7), *filled)]
+    assert min(ids) > max(m.id for m in filled)
 
 
 def test_other_programs_read_the_tables(filled, tmp_path):
@@ -105,9 +101,8 @@ def as_json(**changes):
 def test_a_file_that_makes_no_sense_is_refused_and_changes_nothing(filled, tmp_path, name, text, message):
     path, before = tmp_path / f"bad.{name}", list(filled)
     path.write_text(text, "utf-8")
-    for replaced in (False, True):
-        with pytest.raises(LandmarkMapError, match=message):
-            import_map(filled, path, replaced)
+    with pytest.raises(MapFileError, match=message):
+        import_map(filled, path)
     assert list(filled) == before
 
 
@@ -125,18 +120,18 @@ def test_files_that_cannot_be_are_refused(filled, tmp_path):
         lambda: export_picture(filled, tmp_path / "map.png", float("nan")),
         lambda: export_picture(filled, tmp_path / "map.png", 0.001),
     ):
-        with pytest.raises(LandmarkMapError):
+        with pytest.raises(MapFileError):
             refused()
     assert {path.suffix for path in tmp_path.iterdir()} <= {".db", ".db-wal", ".db-shm", ".csv"}
 
 
-def test_an_export_that_fails_leaves_the_old_file(filled, tmp_path):
+def test_an_export_that_fails_leaves_the_old_file(atlas, filled, tmp_path):
     path = tmp_path / "map.json"
     export_map(filled, path)
     before = path.read_bytes()
-    with sqlite3.connect(filled.path) as connection:
-        connection.execute("UPDATE landmarks SET var_x = -1 WHERE id = 200")
-    with pytest.raises(LandmarkMapError, match="positive definite"):
+    with sqlite3.connect(atlas.path) as connection:
+        connection.execute("UPDATE landmarks SET var_x = -1 WHERE id = ?", (list(filled)[200].id,))
+    with pytest.raises(MapFileError, match="positive definite"):
         export_map(filled, path)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir() if "part" in p.name] == []
@@ -171,6 +166,6 @@ def test_the_picture_puts_landmarks_where_ros_looks_for_them(filled, tmp_path, r
 def test_an_empty_map_makes_tables_but_no_picture(landmark_map, tmp_path):
     for name in FORMATS:
         export_map(landmark_map, tmp_path / f"map.{name}")
-        assert import_map(landmark_map, tmp_path / f"map.{name}", replace=True) == []
-    with pytest.raises(LandmarkMapError, match="nothing to draw"):
+        assert import_map(landmark_map, tmp_path / f"map.{name}") == []
+    with pytest.raises(MapFileError, match="nothing to draw"):
         export_picture(landmark_map, tmp_path / "map.png")

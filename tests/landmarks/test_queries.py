@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from landmark_maps import RandomLandmarks, corner
 
-from lidarcore.errors import LandmarkError
-from lidarcore.landmarks import Box, Circle, Filter, LandmarkMap
+from lidarcore.errors import LandmarkError, UnknownLandmarkError
+from lidarcore.landmarks import Atlas, Box, Circle, Filter
 
 FILTERS = {
     "all": (Filter(), lambda t: np.full(len(t.ids), True)),
@@ -36,8 +36,11 @@ def truth():
 
 @pytest.fixture(scope="module")
 def big_map(truth, tmp_path_factory):
-    with LandmarkMap(tmp_path_factory.mktemp("maps") / "big.db") as landmark_map:
+    """In the same place as another session's."""
+    with Atlas(tmp_path_factory.mktemp("maps") / "big.db") as atlas:
+        landmark_map = atlas.begin("big", 0.0)
         assert landmark_map.put(truth.landmarks()) == truth.ids.tolist()
+        atlas.begin("other", 0.0).put(RandomLandmarks(10_000, seed=1).landmarks())
         yield landmark_map
 
 
@@ -144,10 +147,12 @@ def test_landmarks_on_one_spot_come_in_the_order_of_their_ids(big_map, truth):
 def test_an_empty_map_has_nothing_anywhere(landmark_map, metric):
     assert landmark_map.nearest((0, 0), 3, metric=metric) == []
     assert landmark_map.find(Box(-1, -1, 1, 1)).landmarks == []
-    landmark_map.put([corner()])
+    (id,) = landmark_map.put([corner()])
     landmark_map.clear()
     assert landmark_map.nearest((0, 0), 3, metric=metric) == []
     assert landmark_map.extent() is None
+    with pytest.raises(UnknownLandmarkError):
+        landmark_map.history(id)
 
 
 @pytest.mark.parametrize("metric", ["euclidean", "mahalanobis"])
@@ -160,6 +165,25 @@ def test_a_landmark_is_found_where_it_moved_and_as_certain_as_it_became(landmark
     assert landmark_map.nearest((899, 899), 1, metric=metric)[0].landmark.id == moving
     assert len(landmark_map.nearest((0, 0), 2000, metric=metric)) == others + 2
     assert not landmark_map.find(Circle(0, 0, 1)).landmarks
+
+
+@pytest.mark.parametrize("metric", ["euclidean", "mahalanobis"])
+@pytest.mark.parametrize("n", [10, 1500])
+def test_sessions_in_one_place_do_not_see_each_other(atlas, metric, n):
+    truths = [RandomLandmarks(n, seed) for seed in range(5)]
+    maps = [atlas.begin(f"run {seed}", 0.0) for seed in range(5)]
+    first, *_, last = [m.put(t.landmarks()) for m, t in zip(maps, truths, strict=True)]
+    assert set(first).isdisjoint(last)
+    for landmark_map, truth in zip(maps, truths, strict=True):
+        found = landmark_map.nearest((30, 40), 10, metric=metric)
+        distance = mahalanobis(truth, (30, 40), np.zeros((2, 2)))
+        if metric == "euclidean":
+            distance = np.hypot(*(truth.xy - (30, 40)).T)
+        np.testing.assert_allclose([one.distance for one in found], np.sort(distance)[:10], rtol=1e-9)
+        inside = (np.abs(truth.xy - (30, 40)) <= 5).all(1)
+        page = landmark_map.find(Box(25, 35, 35, 45))
+        assert [(m.x, m.y) for m in page.landmarks] == [tuple(xy) for xy in truth.xy[inside]]
+        assert len(landmark_map) == n
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,12 @@
 import os
+import shutil
 import signal
 import sqlite3
 import subprocess
 import sys
 import threading
 from dataclasses import replace
+from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
@@ -13,17 +15,16 @@ from hypothesis import strategies as st
 from hypothesis.stateful import Bundle, RuleBasedStateMachine, consumes, initialize, multiple, rule
 from landmark_maps import RandomLandmarks, corner
 
-from lidarcore.errors import LandmarkError, LandmarkMapError, UnknownLandmarkError
-from lidarcore.landmarks import Box, LandmarkMap, Session
+from lidarcore.errors import LandmarkError, LandmarkMapError, UnknownLandmarkError, UnknownSessionError
+from lidarcore.landmarks import Atlas, Box, Session
 
 WRITER = """
 import sys
-from lidarcore.landmarks import Landmark, LandmarkMap
-landmark_map = LandmarkMap(sys.argv[1])
-session = landmark_map.begin_session("writer", 0.0)
+from lidarcore.landmarks import Atlas, Landmark
+landmark_map = Atlas(sys.argv[1]).begin("writer", 0.0, "slam")
 for i in range(10**9):
     new = [Landmark(float(i), float(j), 1e-4, 0.0, 1e-4, "corner", last_seen=float(i)) for j in range(3)]
-    print(*landmark_map.put(new, session), flush=True)
+    print(*landmark_map.put(new), flush=True)
 """
 
 
@@ -36,14 +37,15 @@ def test_no_confirmed_landmark_is_lost_when_the_process_is_killed(tmp_path, line
         os.kill(process.pid, signal.SIGKILL)
         confirmed += process.stdout.read().splitlines()
     ids = [int(word) for line in confirmed for word in line.split()]
-    with LandmarkMap(path) as landmark_map:
+    with Atlas(path) as atlas:
+        landmark_map = atlas.newest()
         kept = {landmark.id: landmark for landmark in landmark_map}
         assert set(ids) <= set(kept)
         assert len(kept) % 3 == 0  # a transaction is there as a whole or not at all
         assert all(kept[id].xy.tolist() == [(id - 1) // 3, (id - 1) % 3] for id in ids)
         assert len(landmark_map.find(Box(-1, -1, 1e6, 1e6), limit=10_000).landmarks) == len(kept)
-        assert landmark_map.history(ids[-1])[-1].landmark == kept[ids[-1]]
-        assert landmark_map.sessions() == [Session(1, "writer", 0.0, None)]
+        assert landmark_map.history(ids[-1])[-1] == kept[ids[-1]]
+        assert atlas.sessions() == [Session(1, "writer", "slam", 0.0, None, len(kept))]
         assert landmark_map.put([corner()]) == [max(kept) + 1]
     assert sqlite3.connect(path).execute("PRAGMA integrity_check").fetchall() == [("ok",)]
 
@@ -60,12 +62,13 @@ class AgainstDictionary(RuleBasedStateMachine):
     @initialize()
     def open(self):
         self.folder, self.model, self.states = TemporaryDirectory(), {}, {}
-        self.map = LandmarkMap(f"{self.folder.name}/map.db")
-        self.session = self.map.begin_session("test", 1.0)
+        self.atlas = Atlas(f"{self.folder.name}/map.db")
+        self.other = self.atlas.begin("other", 0.0)
+        self.map = self.atlas.begin("test", 1.0)
 
     @rule(target=ids, new=st.lists(landmarks, max_size=5))
     def put(self, new):
-        found = self.map.put(new, self.session)
+        found = self.map.put(new)
         for id, landmark in zip(found, new, strict=True):
             assert id not in self.states
             self.model[id] = replace(landmark, id=id)
@@ -76,7 +79,7 @@ class AgainstDictionary(RuleBasedStateMachine):
     def update(self, id, landmark):
         self.model[id] = replace(landmark, id=id)
         self.states[id][int(landmark.last_seen)] = self.model[id]
-        self.map.put([self.model[id]], self.session)
+        self.map.put([self.model[id]])
 
     @rule(id=consumes(ids))
     def remove(self, id):
@@ -88,12 +91,30 @@ class AgainstDictionary(RuleBasedStateMachine):
     @rule(landmark=landmarks)
     def fail(self, landmark):
         with pytest.raises(UnknownLandmarkError):
-            self.map.put([landmark, replace(landmark, id=10**6)], self.session)
+            self.map.put([landmark, replace(landmark, id=10**6)])
+
+    @rule(landmark=landmarks)
+    def use_another_session(self, landmark):
+        (id,) = self.other.put([landmark])
+        assert self.atlas.holding(id).session == self.other.session
+        for refused in (lambda: self.map[id], lambda: self.map.remove([id]), lambda: self.map.history(id)):
+            with pytest.raises(UnknownLandmarkError):
+                refused()
+        with pytest.raises(UnknownLandmarkError):
+            self.map.put([replace(landmark, id=id)])
+
+    @rule()
+    def delete_another_session(self):
+        self.atlas.delete(self.other.session)
+        with pytest.raises(UnknownSessionError):
+            self.other.put([corner()])
+        self.other = self.atlas.begin("other", 0.0)
 
     @rule()
     def reopen(self):
-        self.map.close()
-        self.map = LandmarkMap(f"sqlite:///{self.map.path}")
+        self.atlas.close()
+        self.atlas = Atlas(f"sqlite:///{self.atlas.path}")
+        self.map, self.other = self.atlas[self.map.session], self.atlas[self.other.session]
 
     @rule(low=st.integers(-1000, 0), high=st.integers(0, 1000))
     def compare(self, low, high):
@@ -106,11 +127,11 @@ class AgainstDictionary(RuleBasedStateMachine):
     def compare_one(self, id):
         assert self.map[id] == self.model[id]
         history = self.map.history(id)
-        assert [state.landmark for state in history] == [self.states[id][s] for s in sorted(self.states[id])]
-        assert {state.session for state in history} == {self.session}
+        assert history == [self.states[id][s] for s in sorted(self.states[id])]
+        assert self.atlas.holding(id).session == self.map.session
 
     def teardown(self):
-        self.map.close()
+        self.atlas.close()
         self.folder.cleanup()
 
 
@@ -127,11 +148,11 @@ def test_readers_see_whole_transactions_while_another_process_writes(tmp_path):
             near = landmark_map.nearest((0, 0), 9_999)
             wrong.extend(n for n in (len(found), len(near), len(list(landmark_map))) if n % 3)
 
-    with LandmarkMap(path) as landmark_map:
+    with Atlas(path) as atlas:
         command = [sys.executable, "-c", WRITER, str(path)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             process.stdout.readline()
-            written = threading.Event()
+            landmark_map, written = atlas.newest(), threading.Event()
             threads = [threading.Thread(target=read, args=(landmark_map, written)) for _ in range(3)]
             for thread in threads:
                 thread.start()
@@ -150,38 +171,105 @@ def test_history_keeps_the_last_state_of_each_second_and_pages(landmark_map):
     (id,) = landmark_map.put([corner(0.0)])
     for i in range(1, 100):
         landmark_map.put([corner(i, count=i, last_seen=i / 10, id=id)])
-    states = [state.landmark for state in landmark_map.history(id)]
+    states = landmark_map.history(id)
     assert [landmark.count for landmark in states] == [9, 19, 29, 39, 49, 59, 69, 79, 89, 99]
     first = landmark_map.history(id, limit=4)
-    rest = landmark_map.history(id, after=first[-1].landmark.last_seen)
-    assert [state.landmark for state in first + rest] == states
+    rest = landmark_map.history(id, after=first[-1].last_seen)
+    assert first + rest == states
     landmark_map.remove([id])
-    assert [state.landmark for state in landmark_map.history(id)] == states
+    assert landmark_map.history(id) == states
     with pytest.raises(UnknownLandmarkError):
         landmark_map.history(id + 1)
 
 
-def test_sessions_are_told_apart(landmark_map):
-    first, second = (landmark_map.begin_session(name, at) for name, at in (("a.mcap", 5.0), ("device", 9.0)))
-    (id,) = landmark_map.put([corner(last_seen=1.0)], first)
-    landmark_map.put([corner(last_seen=2.0, id=id)], second)
-    landmark_map.end_session(first, 7.0)
-    assert [state.session for state in landmark_map.history(id)] == [first, second]
-    assert landmark_map.sessions() == [Session(1, "a.mcap", 5.0, 7.0), Session(2, "device", 9.0, None)]
+def test_sessions_are_told_apart(atlas):
+    first, second = atlas.begin("a.mcap", 5.0, "slam"), atlas.begin("device", 9.0)
+    first.put([corner(), corner(5)])
+    atlas.end(first.session, 7.0)
+    assert atlas.sessions() == [
+        Session(1, "a.mcap", "slam", 5.0, 7.0, 2),
+        Session(2, "device", "", 9.0, None, 0),
+    ]
+    atlas.end(second.session, 8.0)  # the clock was set back
+    assert atlas.session(2).ended == 9.0
+    assert (len(atlas[1]), len(atlas[2]), atlas.newest().session) == (2, 0, 1)
     for refused in (
-        lambda: landmark_map.put([corner()], 3),
-        lambda: landmark_map.end_session(3, 10.0),
-        lambda: landmark_map.end_session(second, 8.0),
+        lambda: atlas[3],
+        lambda: atlas.session(3),
+        lambda: atlas.end(3, 9.0),
+        lambda: atlas.delete(3),
     ):
-        with pytest.raises(LandmarkMapError, match=r"no session [23]"):
+        with pytest.raises(UnknownSessionError, match="no session 3"):
             refused()
-    with pytest.raises(LandmarkError):
-        landmark_map.begin_session("clock", float("nan"))
-    assert len(landmark_map) == 1
+    for refused in (lambda: atlas.begin("clock", float("nan")), lambda: atlas.end(1, float("inf"))):
+        with pytest.raises(LandmarkError):
+            refused()
+    with pytest.raises(UnknownLandmarkError):
+        atlas.holding(3)
+
+
+def test_the_newest_map_is_one_that_has_landmarks(atlas):
+    assert atlas.newest() is None
+    assert atlas.sessions() == []
+    first, second, _ = (atlas.begin("run", 0.0) for _ in range(3))
+    assert atlas.newest() is None
+    for landmark_map in (first, second):
+        landmark_map.put([corner()])
+        assert atlas.newest().session == landmark_map.session
+    second.clear()
+    assert atlas.newest().session == first.session
+
+
+def test_a_deleted_session_is_gone_with_all_it_had_and_its_ids_are_not_given_again(atlas):
+    kept, gone = atlas.begin("kept", 1.0), atlas.begin("gone", 2.0)
+    (stays,), ids = kept.put([corner()]), gone.put(RandomLandmarks(2500).landmarks())
+    gone.remove(ids[:1])
+    atlas.delete(gone.session)
+    assert [one.id for one in atlas.sessions()] == [kept.session]
+    assert atlas.newest().session == kept.session
+    assert [m.id for m in kept] == [stays]
+    for id in (ids[0], ids[-1]):
+        with pytest.raises(UnknownLandmarkError):
+            atlas.holding(id)
+    with sqlite3.connect(atlas.path) as connection:
+        for table in ("landmarks", "places", "history", "extents"):
+            assert connection.execute(f"SELECT count(*) FROM {table}").fetchone() == (1,), table
+    connection.close()
+    new = atlas.begin("new", 3.0)
+    assert new.session == gone.session + 1
+    assert new.put([corner()]) == [ids[-1] + 1]
+
+
+DELETER = """
+import sys
+from lidarcore.landmarks import Atlas
+print("deleting", flush=True)
+Atlas(sys.argv[1]).delete(1)
+"""
+
+
+def test_a_deletion_that_is_killed_is_whole_and_the_next_one_frees_the_rest(tmp_path):
+    path = tmp_path / "map.db"
+    with Atlas(path) as atlas:
+        atlas.begin("first", 1.0).put(RandomLandmarks(20_000).landmarks())
+        (id,) = atlas.begin("second", 2.0).put([corner()])
+        atlas.begin("third", 3.0)
+        with subprocess.Popen([sys.executable, "-c", DELETER, str(path)], stdout=subprocess.PIPE) as process:
+            process.stdout.readline()
+            while len(atlas.sessions()) == 3:
+                pass
+            process.kill()
+        with pytest.raises(UnknownSessionError):
+            atlas[1]
+        assert [m.id for m in atlas[2]] == [id]
+        atlas.delete(3)
+        with sqlite3.connect(path) as connection:
+            for table in ("landmarks", "places", "history", "extents"):
+                assert connection.execute(f"SELECT count(*) FROM {table}").fetchone() == (1,), table
 
 
 def test_what_fails_half_way_changes_nothing(landmark_map):
-    landmark_map.put(RandomLandmarks(20).landmarks())
+    ids = landmark_map.put(RandomLandmarks(20).landmarks())
     before = list(landmark_map)
 
     def breaking():
@@ -190,9 +278,8 @@ def test_what_fails_half_way_changes_nothing(landmark_map):
 
     for attempt in (
         lambda: landmark_map.put(breaking()),
-        lambda: landmark_map.replace(breaking()),
-        lambda: landmark_map.replace([corner(id=7), corner(id=7)]),
-        lambda: landmark_map.remove([1, 2, 99]),
+        lambda: landmark_map.put([corner(id=ids[3]), corner(id=10**6)]),
+        lambda: landmark_map.remove([*ids, 10**6]),
     ):
         with pytest.raises((RuntimeError, LandmarkMapError)):
             attempt()
@@ -200,8 +287,40 @@ def test_what_fails_half_way_changes_nothing(landmark_map):
         assert len(landmark_map.find(Box(-1e6, -1e6, 1e6, 1e6)).landmarks) == 20
 
 
+def test_a_file_of_version_1_opens_with_all_it_had_as_one_session(tmp_path):
+    """Written by the first version: 40 random landmarks, the seventh moved, the fifth and sixth removed again."""
+    path = shutil.copy(Path(__file__).with_name("version_1.db"), tmp_path / "old.db")
+    truth = [replace(m, id=i) for i, m in enumerate(RandomLandmarks(40).landmarks(), 1)]
+    moved = corner(3, 4, id=7, count=9, last_seen=2e5)
+    for _ in range(2):
+        with Atlas(path) as atlas:
+            landmark_map = atlas.newest()
+            assert list(landmark_map) == [*truth[:4], moved, *truth[7:]]
+            assert landmark_map.history(7) == [truth[6], moved]
+            assert landmark_map.history(5) == [truth[4]]
+            first, last = min(m.first_seen for m in (*truth, moved)), 2e5
+            assert atlas.sessions() == [
+                Session(1, "room.mcap", "", 5.0, None, 0),
+                Session(2, "before sessions", "", first, last, 38),
+            ]
+            assert landmark_map.nearest((3, 4))[0].landmark == moved
+            inside = [m for m in landmark_map if 20 <= m.x <= 40 and 30 <= m.y <= 50]
+            assert landmark_map.find(Box(20, 30, 40, 50)).landmarks == inside != []
+
+
+def test_an_empty_file_of_version_1_has_no_session(tmp_path):
+    path = shutil.copy(Path(__file__).with_name("version_1.db"), tmp_path / "old.db")
+    with sqlite3.connect(path) as connection:
+        for table in ("landmarks", "places", "history", "sessions"):
+            connection.execute(f"DELETE FROM {table}")
+    connection.close()
+    with Atlas(path) as atlas:
+        assert atlas.newest() is None
+        assert atlas.begin("new", 0.0).put([corner()]) == [41]
+
+
 def spoil(path, *statements):
-    LandmarkMap(path).close()
+    Atlas(path).close()
     with sqlite3.connect(path) as connection:
         for statement in statements:
             connection.execute(statement)
@@ -222,7 +341,7 @@ def test_a_map_of_another_version_or_unit_is_refused_and_left_alone(tmp_path, st
     spoil(path, statement)
     before = path.read_bytes()
     with pytest.raises(LandmarkMapError, match=text):
-        LandmarkMap(path)
+        Atlas(path)
     assert path.read_bytes() == before
 
 
@@ -231,17 +350,17 @@ def test_a_file_that_is_no_database_is_refused_and_left_alone(tmp_path, content)
     path = tmp_path / "map.db"
     path.write_bytes(content)
     with pytest.raises(LandmarkMapError):
-        LandmarkMap(path)
+        Atlas(path)
     assert path.read_bytes() == content
 
 
 def test_a_damaged_landmark_does_not_come_out(tmp_path):
     path = tmp_path / "map.db"
-    with LandmarkMap(path) as landmark_map:
-        landmark_map.put([corner()])
+    with Atlas(path) as atlas:
+        (id,) = atlas.begin("test", 0.0).put([corner()])
     spoil(path, "UPDATE landmarks SET var_x = -1")
-    with LandmarkMap(path) as landmark_map, pytest.raises(LandmarkError, match="positive definite"):
-        landmark_map[1]
+    with Atlas(path) as atlas, pytest.raises(LandmarkError, match="positive definite"):
+        atlas.newest()[id]
 
 
 @pytest.mark.parametrize(
@@ -249,12 +368,13 @@ def test_a_damaged_landmark_does_not_come_out(tmp_path):
 )
 def test_what_is_no_file_for_a_map_is_refused(url):
     with pytest.raises(LandmarkMapError):
-        LandmarkMap(url)
+        Atlas(url)
 
 
 def test_a_closed_map_says_so(tmp_path):
-    landmark_map = LandmarkMap(tmp_path / "map.db")
-    landmark_map.close()
-    for use in (lambda: landmark_map.put([corner()]), lambda: landmark_map.find()):
+    atlas = Atlas(tmp_path / "map.db")
+    landmark_map = atlas.begin("test", 0.0)
+    atlas.close()
+    for use in (lambda: landmark_map.put([corner()]), lambda: landmark_map.find(), lambda: atlas.sessions()):
         with pytest.raises(LandmarkMapError, match="closed"):
             use()

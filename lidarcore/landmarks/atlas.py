@@ -1,0 +1,135 @@
+"""The file of maps: one for each session, since every run of SLAM has a world frame of its own."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from lidarcore.errors import UnknownLandmarkError, UnknownSessionError
+from lidarcore.landmarks.database import PATIENCE, Database, path_of
+from lidarcore.landmarks.landmark import Landmark
+from lidarcore.landmarks.landmark_map import LandmarkMap, purge
+from lidarcore.landmarks.queries import check_finite
+
+_SESSIONS = """SELECT id, source, mode, started, ended,
+    (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id) FROM sessions"""
+
+
+@dataclass(frozen=True, slots=True)
+class Session:
+    """One run, or one imported file, whose landmarks share a world frame.
+
+    source, mode    where they come from ("room.mcap") and how ("slam", "import")
+    started, ended  s since 1970, by the computer's clock; `ended` None while it runs or if it was killed
+    landmarks       how many there are
+    """
+
+    id: int
+    source: str
+    mode: str
+    started: float
+    ended: float | None
+    landmarks: int
+
+
+class Atlas:
+    """Maps of landmarks in one file, made if it is not there: `atlas.newest()`, `atlas[session]`.
+
+    Any number of threads and processes may use it, each thread through the same object; reading does not wait for
+    writing. Ids of landmarks are unique in the file, and none is given twice.
+
+    Raises LandmarkMapError if the file cannot be used: no map, another version or unit, damaged, locked, disk full.
+    """
+
+    def __init__(self, url: str | Path, patience: float = PATIENCE) -> None:
+        """Open a path or sqlite:///path; `patience` is for how many seconds to wait while another process writes."""
+        self._database = Database(path_of(url), patience)
+        self.path = self._database.path
+
+    def __enter__(self) -> "Atlas":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file; no other call may be under way."""
+        self._database.close()
+
+    def begin(
+        self, source: str, started: float, mode: str = "", landmarks: Iterable[Landmark] = ()
+    ) -> LandmarkMap:
+        """A new session and its map, with new landmarks (id None) if they are known; all or nothing."""
+        check_finite(started=started)
+        with self._database.writing() as connection:
+            query = "INSERT INTO sessions (source, mode, started) VALUES (?, ?, ?) RETURNING id"
+            (session,) = connection.execute(query, (source, mode, started)).fetchone()
+            landmark_map = LandmarkMap(self._database, session)
+            landmark_map.store(connection, landmarks)
+        return landmark_map
+
+    def end(self, session: int, ended: float) -> None:
+        """Note that a session has ended, at its start if the clock was set back since. Raises UnknownSessionError."""
+        check_finite(ended=ended)
+        with self._database.writing() as connection:
+            query = "UPDATE sessions SET ended = max(?2, started) WHERE id = ?1"
+            if not connection.execute(query, (session, ended)).rowcount:
+                raise _unknown(session)
+
+    def sessions(self) -> list[Session]:
+        """All sessions, the oldest first."""
+        with self._database.reading() as connection:
+            return [Session(*row) for row in connection.execute(f"{_SESSIONS} ORDER BY id")]
+
+    def session(self, id: int) -> Session:
+        """One session; raises UnknownSessionError."""
+        with self._database.reading() as connection:
+            row = connection.execute(f"{_SESSIONS} WHERE id = ?", (id,)).fetchone()
+        if row is None:
+            raise _unknown(id)
+        return Session(*row)
+
+    def __getitem__(self, session: int) -> LandmarkMap:
+        """The map of a session; raises UnknownSessionError."""
+        with self._database.reading() as connection:
+            if not connection.execute("SELECT 1 FROM sessions WHERE id = ?", (session,)).fetchone():
+                raise _unknown(session)
+        return LandmarkMap(self._database, session)
+
+    def newest(self) -> LandmarkMap | None:
+        """The map of the newest session that has landmarks; None if there is none."""
+        query = "SELECT max(session) FROM extents WHERE session IN (SELECT id FROM sessions)"
+        with self._database.reading() as connection:
+            (session,) = connection.execute(query).fetchone()
+        return None if session is None else LandmarkMap(self._database, session)
+
+    def holding(self, landmark: int) -> LandmarkMap:
+        """The map that holds, or held, the landmark with this id; raises UnknownLandmarkError."""
+        query = (
+            "SELECT session FROM history JOIN sessions ON sessions.id = session WHERE landmark = ? LIMIT 1"
+        )
+        with self._database.reading() as connection:
+            row = connection.execute(query, (landmark,)).fetchone()
+        if row is None:
+            raise UnknownLandmarkError(f"No map holds a landmark {landmark}.")
+        return LandmarkMap(self._database, row[0])
+
+    def delete(self, session: int) -> None:
+        """Give up a session, its landmarks and their history; raises UnknownSessionError.
+
+        The session is gone at once and whole; the room it takes is freed bit by bit, so that writers need not wait. If
+        that is interrupted, the next call frees it.
+        """
+        with self._database.writing() as connection:
+            if not connection.execute("DELETE FROM sessions WHERE id = ?", (session,)).rowcount:
+                raise _unknown(session)
+        with self._database.reading() as connection:
+            left = connection.execute(
+                "SELECT session FROM extents WHERE session NOT IN (SELECT id FROM sessions)"
+            )
+            gone = [row[0] for row in left]
+        for id in gone:
+            purge(self._database, id)
+
+
+def _unknown(session: int) -> UnknownSessionError:
+    return UnknownSessionError(f"There is no session {session}.")

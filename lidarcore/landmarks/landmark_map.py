@@ -1,0 +1,206 @@
+"""The map of one session on disk: what is in it, and what it can be asked."""
+
+import math
+import sqlite3
+from collections.abc import Iterable, Iterator
+from typing import get_args
+
+from numpy.typing import ArrayLike
+
+from lidarcore.errors import LandmarkError, UnknownLandmarkError, UnknownSessionError
+from lidarcore.landmarks.database import Database
+from lidarcore.landmarks.landmark import COLUMNS, Landmark, as_covariance, as_position
+from lidarcore.landmarks.nearest import Metric, Neighbour, Neighbourhood
+from lidarcore.landmarks.queries import (
+    SELECTED,
+    Box,
+    Circle,
+    Filter,
+    Page,
+    check_finite,
+    check_limit,
+    check_order,
+    find,
+)
+
+_ALL = Filter()
+_STATE = ", ".join(COLUMNS[:-1])  # all but the id
+_VALUES = ", ".join(f":{name}" for name in COLUMNS[:-1])
+_INSERT = f"INSERT INTO landmarks ({_STATE}, id, session, sigma) VALUES ({_VALUES}, NULL, :session, :sigma)"
+_UPDATE = (
+    f"UPDATE landmarks SET ({_STATE}, sigma) = ({_VALUES}, :sigma) WHERE id = :id AND session = :session"
+)
+_PLACE = "INSERT OR REPLACE INTO places VALUES (:id, :x, :x, :y, :y, 0, :sigma, :session, :session + 0.5)"
+_REMEMBER = (
+    f"INSERT OR REPLACE INTO history ({_STATE}, landmark, second, session) "
+    f"VALUES ({_VALUES}, :id, :second, :session)"
+)
+_WIDEN = (
+    "INSERT INTO extents VALUES (:session, :x, :x, :y, :y, :sigma, :sigma) ON CONFLICT DO UPDATE SET "
+    + ", ".join(
+        f"{name}_{least} = {least}({name}_{least}, :{name})"
+        for name in ("x", "y", "sigma")
+        for least in ("min", "max")
+    )
+)
+_IN_SESSION = f"SELECT {SELECTED} FROM landmarks WHERE session = :session"
+_AT_ONCE = 1000  # landmarks, and states of some, that one transaction gives up: others wait no longer
+
+
+class LandmarkMap:
+    """The landmarks of one session, in metres in its world frame. An Atlas makes it.
+
+    What `put` was given is on the disk when it returns. History keeps the last state of a landmark within each second
+    of its last_seen.
+    """
+
+    def __init__(self, database: Database, session: int) -> None:
+        self._database = database
+        self.session = session
+
+    def __len__(self) -> int:
+        with self._database.reading() as connection:
+            query = "SELECT count(*) FROM landmarks WHERE session = ?"
+            return int(connection.execute(query, (self.session,)).fetchone()[0])
+
+    def __iter__(self) -> Iterator[Landmark]:
+        """All landmarks in the order of their ids, as they were when the iteration began."""
+        with self._database.reading() as connection:
+            for row in connection.execute(f"{_IN_SESSION} ORDER BY id", {"session": self.session}):
+                yield Landmark(*row)
+
+    def __getitem__(self, id: int) -> Landmark:
+        """Raises UnknownLandmarkError."""
+        with self._database.reading() as connection:
+            query, parameters = f"{_IN_SESSION} AND id = :id", {"session": self.session, "id": id}
+            if row := connection.execute(query, parameters).fetchone():
+                return Landmark(*row)
+        raise self._unknown(id)
+
+    def put(self, landmarks: Iterable[Landmark], without: Iterable[int] = ()) -> list[int]:
+        """Store new landmarks (id None) and new states of known ones, and take out those `without`; the ids stored.
+
+        All or none. The history of what is taken out stays. Raises UnknownLandmarkError for an id that is not in the
+        map, UnknownSessionError if the session was deleted.
+        """
+        with self._database.writing() as connection:
+            if not connection.execute("SELECT 1 FROM sessions WHERE id = ?", (self.session,)).fetchone():
+                raise UnknownSessionError(f"Session {self.session} was deleted: begin another one.")
+            for id in without:
+                self._remove(connection, id)
+            return self.store(connection, landmarks)
+
+    def store(self, connection: sqlite3.Connection, landmarks: Iterable[Landmark]) -> list[int]:
+        """What `put` does, within a transaction."""
+        return [self._store(connection, landmark) for landmark in landmarks]
+
+    def _store(self, connection: sqlite3.Connection, landmark: Landmark) -> int:
+        values = {name: getattr(landmark, name) for name in COLUMNS} | {"session": self.session}
+        values |= {"sigma": landmark.sigma, "second": math.floor(landmark.last_seen)}
+        if landmark.id is None:
+            values["id"] = connection.execute(_INSERT, values).lastrowid
+        elif not connection.execute(_UPDATE, values).rowcount:
+            raise self._unknown(landmark.id)
+        for statement in (_PLACE, _WIDEN, _REMEMBER):
+            connection.execute(statement, values)
+        return int(values["id"])
+
+    def _remove(self, connection: sqlite3.Connection, id: int) -> None:
+        query = "DELETE FROM landmarks WHERE id = ? AND session = ?"
+        if not connection.execute(query, (id, self.session)).rowcount:
+            raise self._unknown(id)
+        connection.execute("DELETE FROM places WHERE id = ?", (id,))
+
+    def remove(self, ids: Iterable[int]) -> None:
+        """Take landmarks out, all or none; their history stays. Raises UnknownLandmarkError."""
+        self.put((), without=ids)
+
+    def clear(self) -> None:
+        """Give up all landmarks and their history, bit by bit, so that others who write need not wait."""
+        purge(self._database, self.session)
+
+    def find(
+        self, region: Box | Circle | None = None, which: Filter = _ALL, after: int = 0, limit: int = 1000
+    ) -> Page:
+        """A page of at most `limit` landmarks in the region (None: anywhere), in the order of their ids.
+
+        `after` is 0 for the first page, then the `next` of the page before. Raises LandmarkError.
+        """
+        with self._database.reading() as connection:
+            return find(connection, self.session, region, which, after, limit)
+
+    def nearest(
+        self,
+        xy: ArrayLike,
+        k: int = 1,
+        which: Filter = _ALL,
+        within: float = math.inf,
+        metric: Metric = "euclidean",
+        covariance: ArrayLike | None = None,
+    ) -> list[Neighbour]:
+        """The k landmarks nearest to a point (2,) m, nearest first; those of equal distance by id.
+
+        within      largest distance: m, or for Mahalanobis without unit, such as the root of a chi-square gate
+        covariance  (2, 2) m² of the point, for Mahalanobis: the distance is sqrt(d^T (C + covariance)^-1 d) with
+                    the landmark's C; None for an exact point
+
+        Looks at every landmark of the map where few pass the filter, or far off the map; there `within` helps.
+        Raises LandmarkError.
+        """
+        x, y = as_position(xy)
+        check_finite(x=x, y=y)
+        check_limit("k", k)
+        check_order("0", 0.0, "within", within)
+        if metric not in get_args(Metric) or (metric == "euclidean" and covariance is not None):
+            raise LandmarkError(
+                f"metric is {metric!r}: choose mahalanobis, or euclidean, which takes no covariance of the point."
+            )
+        point = (0.0, 0.0, 0.0) if covariance is None else as_covariance(covariance)
+        with self._database.reading() as connection:
+            return Neighbourhood(connection, self.session, (x, y), point, which).nearest(k, within, metric)
+
+    def history(self, id: int, after: float = -math.inf, limit: int = 1000) -> list[Landmark]:
+        """States of one landmark with last_seen > after (s), oldest first, also of one that was removed.
+
+        Raises UnknownLandmarkError.
+        """
+        check_limit("limit", limit)
+        check_order("-inf", -math.inf, "after", after)
+        of_it, parameters = "FROM history WHERE landmark = ? AND session = ?", (id, self.session)
+        query = f"SELECT {_STATE}, landmark {of_it} AND last_seen > ? ORDER BY second LIMIT ?"
+        with self._database.reading() as connection:
+            if not connection.execute(f"SELECT 1 {of_it}", parameters).fetchone():
+                raise self._unknown(id)
+            rows = connection.execute(query, (*parameters, after, limit)).fetchall()
+        return [Landmark(*row) for row in rows]
+
+    def extent(self) -> Box | None:
+        """The smallest box around all landmarks, m; None for an empty map. Reads the whole map."""
+        query = "SELECT min(x), min(y), max(x), max(y) FROM landmarks WHERE session = ?"
+        with self._database.reading() as connection:
+            bounds = connection.execute(query, (self.session,)).fetchone()
+        return None if bounds[0] is None else Box(*bounds)
+
+    def _unknown(self, id: int) -> UnknownLandmarkError:
+        return UnknownLandmarkError(f"Session {self.session} holds no landmark {id}.")
+
+
+def purge(database: Database, session: int) -> None:
+    """Delete all landmarks of a session and their history in transactions that are each short."""
+    while not _purge_some(database, session):
+        pass
+
+
+def _purge_some(database: Database, session: int) -> bool:
+    """True if nothing was left."""
+    some = f"WHERE session = {session} LIMIT {_AT_ONCE}"
+    with database.writing() as connection:
+        connection.execute(f"DELETE FROM places WHERE id IN (SELECT id FROM landmarks {some})")
+        landmarks = connection.execute(f"DELETE FROM landmarks WHERE id IN (SELECT id FROM landmarks {some})")
+        states = connection.execute(
+            f"DELETE FROM history WHERE (landmark, second) IN (SELECT landmark, second FROM history {some})"
+        )
+        if max(landmarks.rowcount, states.rowcount) == _AT_ONCE:
+            return False
+        connection.execute("DELETE FROM extents WHERE session = ?", (session,))
+        return True
