@@ -3,6 +3,8 @@
 Metres, radians, seconds; x forward, y left, angles counter-clockwise (REP-103).
 """
 
+from typing import TYPE_CHECKING, Any
+
 from lidarcore.errors import (
     DegenerateLineError,
     DeviceError,
@@ -19,8 +21,12 @@ from lidarcore.recordings import open_recording
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
+if TYPE_CHECKING:
+    from lidarcore.client import Client
+
 __all__ = [
     "FITTERS",
+    "Client",
     "Corners",
     "DegenerateLineError",
     "DeviceError",
@@ -41,3 +47,12 @@ __all__ = [
     "open_recording",
     "warm_up",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """The client on demand: most who import lidarcore need no HTTP."""
+    if name != "Client":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from lidarcore.client import Client
+
+    return Client
