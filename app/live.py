@@ -1,16 +1,13 @@
 """The live source: an RPLIDAR at a port, or an emulated one, through the same driver."""
 
-import logging
 import os
-import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Literal
 
-from app.sources import Source
+from app.history import HistorySource
 from app.wire import DeviceJson
 from lidarcore import DeviceError, Scan
 from lidarcore.rplidar import Driver, find_devices
@@ -18,10 +15,6 @@ from lidarcore.rplidar.capture import Stream
 from lidarcore.rplidar.connection.port import Tap, path_of
 from lidarcore.rplidar.driver import BAUD, check_wishes
 from lidarcore.rplidar.emulator_process import EmulatorProcess
-
-HISTORY = 200  # revolutions kept for stepping back
-
-logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -43,20 +36,18 @@ class Taps:
     bytes: Tap = lambda direction, time, data: None
 
 
-class LiveSource(Source):
-    """Revolutions as they come, numbered from 0; the last HISTORY, and the one shown last, can be shown again.
+class LiveSource(HistorySource):
+    """The revolutions of a sensor.
 
     Connects when made, and streams from `start` on; raises DeviceError if there is no sensor to talk to.
     """
 
-    live = True
-
     def __init__(self, options: DeviceOptions, taps: Taps) -> None:
+        super().__init__(taps.scan)
         self.options = options
         self.kind: Literal["device", "emulator"] = "emulator" if options.emulated else "device"
         self._taps = taps
-        self._started = self._failing = False
-        self._changed: Callable[[], None] = lambda: None
+        self._started = False
         self._let_go: Callable[[], None] = lambda: None
         if options.emulated:
             check_wishes(options.mode, options.rpm)  # before a process is started for them
@@ -75,15 +66,6 @@ class LiveSource(Source):
         except BaseException:
             self._end_emulator()
             raise
-        self._lock = threading.Lock()
-        self._kept: deque[tuple[Scan, float]] = deque(maxlen=HISTORY)
-        self._shown: tuple[int | None, tuple[Scan, float] | None] = (None, None)
-        self._first_stamp = 0.0
-        self._made = 0
-
-    @property
-    def count(self) -> int:
-        return self._made
 
     @property
     def stream(self) -> Stream:
@@ -91,27 +73,9 @@ class LiveSource(Source):
         mode = self._driver.mode
         return Stream(mode.answer_type, mode.us_per_sample, self._driver.baud)
 
-    def nearest(self, index: int) -> int:
-        if index == self._shown[0]:
-            return index
-        return max(self._made - len(self._kept), min(index, self._made - 1), 0)
-
-    def scan(self, index: int) -> Scan | None:
-        kept = self._at(index)
-        if kept is None:
-            return None
-        self._shown = index, kept  # however long it is looked at
-        return kept[0]
-
-    def arrival(self, index: int) -> float:
-        return kept[1] if (kept := self._at(index)) else time.monotonic()
-
-    def time(self, index: int) -> float:
-        return kept[0].stamp - self._first_stamp if (kept := self._at(index)) else 0.0
-
     def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
-        self._changed, self._started = progress, True
-        threading.Thread(target=self._follow, args=(arrived,), name="live", daemon=True).start()
+        self._started = True
+        super().start(arrived, progress)
 
     def close(self) -> None:
         self._driver.close()
@@ -152,41 +116,18 @@ class LiveSource(Source):
             "dropped": dict(statistics.dropped),
         }
 
-    def _follow(self, arrived: Callable[[], None]) -> None:
+    def _follow(self) -> None:
         try:
             for revolution in self._driver.revolutions():
-                scan = revolution.scan(time.time() - time.monotonic())
-                with self._lock:
-                    self._first_stamp = self._first_stamp or scan.stamp
-                    self._kept.append((scan, revolution.arrival))
-                    self._made += 1
-                arrived()
-                self._tell(scan)
+                self._take(revolution.scan(time.time() - time.monotonic()), revolution.arrival)
         except DeviceError as error:
             self.error = str(error)
             self._changed()
-
-    def _tell(self, scan: Scan) -> None:
-        """What others make of a scan must not end the view; nor may a thousand failures fill the log."""
-        try:
-            self._taps.scan(scan)
-            self._failing = False
-        except Exception:
-            if not self._failing:
-                logger.exception("a scan could not be passed on")
-            self._failing = True
 
     def _tap(self, direction: Literal["in", "out"], time: float, data: bytes) -> None:
         """Only of the source that plays: another one may be tried meanwhile."""
         if self._started:
             self._taps.bytes(direction, time, data)
-
-    def _at(self, index: int) -> tuple[Scan, float] | None:
-        if index == self._shown[0]:
-            return self._shown[1]
-        with self._lock:
-            place = index - (self._made - len(self._kept))
-            return self._kept[place] if 0 <= place < len(self._kept) else None
 
     def _emulator_ended(self) -> None:
         """By itself; it does not come back, so there is nothing to reconnect to."""

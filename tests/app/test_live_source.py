@@ -12,6 +12,7 @@ from serial.tools.list_ports_common import ListPortInfo
 from serving import Server, assert_problem, chosen
 
 import app.api.sensor
+import app.history
 import app.live
 from app.live import DeviceOptions, Taps, connected_or_emulated
 from app.player import SourceJson
@@ -141,7 +142,7 @@ def test_while_paused_kept_revolutions_are_stepped_through_and_playing_shows_the
 def test_what_is_looked_at_stays_when_it_is_older_than_what_is_kept(
     server: Server, sensor: EmulatorProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(app.live, "HISTORY", 5)
+    monkeypatch.setattr(app.history, "HISTORY", 5)
     watch(server, sensor)
     with server.stream() as stream:
         revolutions(stream, 3)
