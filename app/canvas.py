@@ -6,19 +6,24 @@ from typing import Any, Literal
 import numpy as np
 from viser import ViserServer
 
-from app.colours import Rgb, Rgbs, untoned
+from app.colours import Rgbs, untoned
 from app.shapes import DISC_FACES, DISC_VERTICES, Array, about_z, lift
 
 FIELD_OF_VIEW = np.radians(6.0)  # so narrow that the picture is nearly orthographic
 FAR = 2e4  # m
 HEIGHTS = {  # from the floor up
-    "grid": 0, "labels": 0, "gaps": 1, "fill": 1, "segments": 2, "outline": 3, "points": 4, "rejected": 5, "crosses": 5,
-    "markers": 6, "sensor": 7, "ring": 8,
+    "grid": 0, "labels": 0, "gaps": 1, "fill": 1, "true": 1, "reckoned": 1, "trail": 2, "segments": 2, "outline": 3,
+    "cluster fill": 1, "clusters": 3, "points": 4, "landmark fill": 3, "rejected": 5, "crosses": 5, "landmarks": 5,
+    "landmark outline": 5, "associations": 6, "markers": 6, "ids": 7, "pose": 7, "sensor": 7, "ring": 8,
+    "landmark ring": 8,
 }  # fmt: skip
 
 
 class Canvas:
-    """A map in layers: discs, strokes and points in metres, seen from above."""
+    """A map in layers: discs, strokes and points in metres, seen from above.
+
+    What hangs under /body is in the sensor frame, the rest in the world frame; `place` says where the sensor is.
+    """
 
     def __init__(self, server: ViserServer) -> None:
         self._server, self._scene = server, server.scene
@@ -27,21 +32,34 @@ class Canvas:
         self._scene.configure_default_lights(enabled=False)
         self._scene.configure_environment_map(None)
         self._scene.add_light_ambient("/light", intensity=np.pi)  # flat: every surface shows its own colour
+        self._body = self._scene.add_frame("/body", show_axes=False)
         self._nodes: dict[str, Any] = {
             "grid": self._scene.add_grid(
                 "/grid", infinite_grid=True, fade_distance=FAR, fade_strength=0, shadow_opacity=0
             ),
             "labels": self._add_strokes("/labels", 1),
-            "gaps": self._add_strokes("/gaps", 1),
-            "fill": self._add_discs("/ellipses/fill", 0.3),
-            "segments": self._add_strokes("/segments", 4),
-            "outline": self._add_strokes("/ellipses/outline", 1.5),
-            "points": self._add_points("/points", "circle"),
-            "rejected": self._add_points("/rejected/points", "square"),
-            "crosses": self._add_strokes("/rejected/crosses", 2),
-            "markers": self._add_discs("/corners", 1.0),
-            "sensor": self._add_strokes("/sensor", 2),
-            "ring": self._add_strokes("/selection", 3),
+            "true": self._add_strokes("/trails/true", 2),
+            "reckoned": self._add_strokes("/trails/reckoned", 1.5),
+            "trail": self._add_strokes("/trails/estimated", 2),
+            "landmark fill": self._add_discs("/landmarks/fill", 0.25),
+            "landmarks": self._add_discs("/landmarks/markers", 1.0),
+            "landmark outline": self._add_strokes("/landmarks/outline", 1.5),
+            "ids": self._add_strokes("/landmarks/ids", 1),
+            "landmark ring": self._add_strokes("/landmarks/ring", 3),
+            "associations": self._add_strokes("/associations", 1.5),
+            "pose": self._add_strokes("/pose", 2),
+            "gaps": self._add_strokes("/body/gaps", 1),
+            "fill": self._add_discs("/body/ellipses/fill", 0.3),
+            "segments": self._add_strokes("/body/segments", 4),
+            "outline": self._add_strokes("/body/ellipses/outline", 1.5),
+            "cluster fill": self._add_discs("/body/clusters/fill", 0.15),
+            "clusters": self._add_strokes("/body/clusters/outline", 2),
+            "points": self._add_points("/body/points", "circle"),
+            "rejected": self._add_points("/body/rejected/points", "square"),
+            "crosses": self._add_strokes("/body/rejected/crosses", 2),
+            "markers": self._add_discs("/body/corners", 1.0),
+            "sensor": self._add_strokes("/body/sensor", 2),
+            "ring": self._add_strokes("/body/selection", 3),
         }
 
     def fit(self, reach: float) -> None:
@@ -54,10 +72,16 @@ class Canvas:
         camera.position, camera.look_at = (0.0, -1e-5 * height, height), (0.0, 0.0, 0.0)
         camera.fov, camera.near, camera.far = FIELD_OF_VIEW, 1.0, FAR
 
-    def paper(self, dark: bool, cell: Rgb, section: Rgb, step: float) -> None:
+    def paper(self, dark: bool, cell: Rgbs, section: Rgbs, step: float) -> None:
         """Set the ground: dark or light, with a section of the grid every `step` metres and a cell every half."""
         self._server.gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False)
-        self._set("grid", cell_color=cell, section_color=section, cell_size=step / 2, section_size=step)
+        lines = {"cell_color": tuple(cell.tolist()), "section_color": tuple(section.tolist())}
+        self._set("grid", cell_size=step / 2, section_size=step, **lines)
+
+    def place(self, pose: Array) -> None:
+        """Put what is in the sensor frame at T_world_sensor (3,)."""
+        self._body.position = (float(pose[0]), float(pose[1]), 0.0)
+        self._body.wxyz = about_z(pose[2:])[0]
 
     def visible(self, name: str, visible: bool) -> None:
         """Show or hide a layer as it is."""
@@ -80,6 +104,9 @@ class Canvas:
         """Show ellipses (C, 2) with half axes (C, 2) turned by angles (C,), in colours (C, 3)."""
         self.visible(name, visible and len(xy) > 0)
         if visible and len(xy):
+            # A browser that joins is told first what was set longest ago, and equal values are not set again: it
+            # would hear of many colours while it knows of one disc, and complain. So colours are always set anew.
+            self._set(name, batched_colors=np.zeros(3, np.uint8))
             self._set(
                 name,
                 batched_positions=lift(xy),

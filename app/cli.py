@@ -11,7 +11,9 @@ import typer
 
 from app.cli_devices import devices
 from app.cli_emulate import PASS_ON, emulate
-from app.cli_options import Set, SettingsFile, settings_from
+from app.cli_experiment import experiment
+from app.cli_localize import localize
+from app.cli_options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
 from app.cli_record import record
 
 cli = typer.Typer(
@@ -21,9 +23,6 @@ cli = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-
-RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
-Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
 
 
 @cli.command()
@@ -54,6 +53,12 @@ def serve(
     recordings: Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")] = Path(
         "recordings"
     ),
+    map: Annotated[
+        str | None,
+        typer.Option(
+            "--map", metavar="URL", help="file of landmark maps; landmarks.db beside the folder of recordings"
+        ),
+    ] = None,
     max_upload: Annotated[int, typer.Option(min=1, help="largest upload, MB")] = 1024,
     token: Annotated[
         str | None, typer.Option(envvar="LIDARCORE_TOKEN", help="token to demand; random if needed")
@@ -84,6 +89,7 @@ def serve(
             recordings=recordings,
             recording=recording,
             topic=topic,
+            map=map,
             device=DeviceOptions(port, baud, mode, rpm, emulator),
             say=lambda sentence: print(sentence, flush=True),
             settings=settings_from(settings, set_),
@@ -104,31 +110,19 @@ def process(
     set_: Set = None,
 ) -> None:
     """Write every scan's segments and corners into a file."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    from app.export import Counts
     from app.export import process as run
     from lidarcore import open_recording
 
     chosen = settings_from(settings, set_)
     fitters = [chosen.patched({"extraction": {"fitter": name}}).extraction.fitter for name in fitter or []]
-    columns = (BarColumn(), TextColumn("{task.completed} scans"), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=None)
-
-        def progress(counts: Counts) -> None:
-            bar.update(task, completed=counts.scans)
-
+    with counting("scans") as count:
         counts = run(
             open_recording(recording, topic),
             output,
             chosen.extraction,
             fitters or [chosen.extraction.fitter],
-            progress,
+            lambda so_far: count(so_far.scans),
         )
-        bar.update(task, total=counts.scans)
     typer.echo(f"{output}: {counts.segments} segments and {counts.corners} corners of {counts.scans} scans")
 
 
@@ -144,6 +138,8 @@ def info(recording: RecordingPath, topic: Topic = None) -> None:
 
 cli.command()(devices)
 cli.command()(record)
+cli.command()(localize)
+cli.add_typer(experiment, name="experiment")
 cli.command(add_help_option=False, context_settings=PASS_ON)(emulate)
 
 

@@ -1,6 +1,8 @@
 """Options that several commands share, and the settings they make."""
 
 import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -9,6 +11,8 @@ import typer
 if TYPE_CHECKING:
     from app.settings import Settings
 
+RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
+Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
 Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="a setting, e.g. gap=0.2 or noise.sigma_range=0.01"),
@@ -17,6 +21,19 @@ SettingsFile = Annotated[
     Path | None,
     typer.Option("--settings", help="a JSON file of settings, as GET /api/v1/settings gives them"),
 ]
+
+
+@contextmanager
+def counting(what: str) -> Iterator[Callable[[int], None]]:
+    """A bar on a terminal that shows how many there have been so far."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TextColumn(f"{{task.completed}} {what}"), TimeElapsedColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda number: bar.update(task, completed=number)
 
 
 def settings_from(file: Path | None, assignments: list[str] | None) -> "Settings":
@@ -45,6 +62,8 @@ def _read_settings(file: Path) -> dict[str, Any]:
 
 def _patch(assignment: str) -> dict[str, Any]:
     """'gap=0.2' or 'view.theme=light' as a merge patch; names without a section are of the extraction."""
+    from app.settings import Settings
+
     name, equals, text = assignment.partition("=")
     if not equals:
         raise typer.BadParameter(f"{assignment!r} should be NAME=VALUE, e.g. gap=0.2.")
@@ -53,7 +72,7 @@ def _patch(assignment: str) -> dict[str, Any]:
     except json.JSONDecodeError:
         patch = text
     path = name.split(".")
-    if path[0] not in ("extraction", "view"):
+    if path[0] not in Settings.model_fields:
         path.insert(0, "extraction")
     for part in reversed(path):
         patch = {part: patch}

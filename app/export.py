@@ -121,7 +121,7 @@ def process(
     if output.exists() and any(output.samefile(path) for path in (recording.path, *recording.path.glob("*"))):
         raise RecordingError(f"{output} is the recording itself: write into another file.")
     counts, batch = Counts(), _Batch()
-    with _replacing(output) as partial, WRITERS[suffix](str(partial), SCHEMA) as writer:
+    with replacing(output) as partial, WRITERS[suffix](str(partial), SCHEMA) as writer:
         for index, scan in enumerate(recording):
             for fitter, features in compare(scan, settings, fitters).items():
                 batch.add(index, scan, fitter, features)
@@ -137,7 +137,7 @@ def process(
 
 
 @contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path) -> Iterator[Path]:
     """A file beside the path that takes its place at the end, or goes away if something fails."""
     partial = path.with_name(f".{path.name}.part")
     try:

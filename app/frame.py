@@ -9,43 +9,45 @@ from typing import cast
 import numpy as np
 from pydantic_core import to_json
 
+from app.located import clusters_json, localization_json
+from app.navigation import Where
+from app.selection import Selection
 from app.settings import Settings
+from app.taken import Taken
 from app.tracking import CornerRow
 from app.wire import (
     CornerJson,
     FrameJson,
     MeasuredCornerJson,
-    PositionJson,
     RejectionJson,
     SegmentJson,
     SummaryJson,
 )
 from lidarcore import Features, Scan
+from lidarcore.clusters import Clusters
 from lidarcore.scan import Array
-
-
-@dataclass(frozen=True, slots=True)
-class Taken:
-    """A scan as the source handed it over, and when its last byte had arrived (time.monotonic, s)."""
-
-    scan: Scan
-    position: PositionJson
-    source: int  # changes with every source opened
-    arrival: float
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Features of one scan by every method asked for, the main one first, under one set of settings."""
+    """Features of one scan by every method asked for, the main one first, under one set of settings.
+
+    `scan` is the one taken, without the distortion by the motion of the sensor as far as that is known.
+    """
 
     sequence: int
     taken: Taken
+    scan: Scan
     settings: Settings
     features: dict[str, Features]
     corners: tuple[CornerRow, ...]
-    selected: int | None
+    selection: Selection
     extract_us: float
     method_us: Mapping[str, float]
+    clusters: Clusters | None = None
+    where: Where | None = None
+    cluster_us: float = 0.0
+    locate_us: float = 0.0
     draw_us: float = 0.0
     rate_hz: float = 0.0
     dropped: int = 0
@@ -76,12 +78,12 @@ class Frame:
     @cached_property
     def text_with_points(self) -> str:
         """The same, and the measured points."""
-        xy = self.taken.scan.xy[self.taken.scan.valid].round(4).tolist()
+        xy = self.scan.xy[self.scan.valid].round(4).tolist()
         return to_json(self._json | {"points": xy}).decode()
 
     @cached_property
     def _json(self) -> FrameJson:
-        scan = self.taken.scan
+        scan = self.scan
         return {
             "sequence": self.sequence,
             "stamp": scan.stamp,
@@ -97,6 +99,8 @@ class Frame:
             "timings": {
                 "extract_us": self.extract_us,
                 "per_method": dict(self.method_us),
+                "cluster_us": self.cluster_us,
+                "locate_us": self.locate_us,
                 "draw_us": self.draw_us,
                 "age_ms": 1e3 * self.age(),
             },
@@ -106,6 +110,8 @@ class Frame:
             "corners": self.corners_json(),
             "rejections": rejections_json(self.main),
             "summary": {name: summary_json(found) for name, found in self.features.items()},
+            "clusters": None if self.clusters is None else clusters_json(self.clusters),
+            "localization": None if self.where is None else localization_json(self.where),
         }
 
     def corners_json(self) -> list[CornerJson]:
@@ -115,7 +121,7 @@ class Frame:
             {
                 "id": row.id,
                 "segments": row.segments,
-                "selected": row.id == self.selected,
+                "selected": row.id == self.selection.corner,
                 "by_method": {name: measured[name][i] for name, i in row.index.items()},
             }
             for row in self.corners

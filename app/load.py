@@ -31,24 +31,24 @@ class Load:
 
 def measure_load(clients: int, seconds: float) -> Load:
     """Serve an emulated sensor to this many browsers: each a stream of frames and a scene."""
-    with _server() as (process, port):
+    with server(*ALL_LAYERS) as (process, port):
         return asyncio.run(_measure(process, port, clients, seconds))
 
 
 @contextmanager
-def _server() -> Iterator[tuple[psutil.Process, int]]:
-    """A server of its own process on a free port."""
+def server(*options: str) -> Iterator[tuple[psutil.Process, int]]:
+    """A server of an emulated sensor, in a process of its own on a free port."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "app.cli", "serve", "--emulator", "--http-port", "0", *ALL_LAYERS]
-        command += ["--recordings", folder]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server:
-            assert server.stdout is not None
-            server.stdout.readline()  # what plays
-            address = server.stdout.readline().split()[-1]
+        command = [sys.executable, "-m", "app.cli", "serve", "--emulator", "--http-port", "0", *options]
+        command += ["--recordings", f"{folder}/recordings"]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            lines = (line for line in process.stdout if "http://" in line)
+            address = next(lines).split()[-1]
             try:
-                yield psutil.Process(server.pid), int(address.rstrip("/").rsplit(":", 1)[1])
+                yield psutil.Process(process.pid), int(address.rstrip("/").rsplit(":", 1)[1])
             finally:
-                server.terminate()
+                process.terminate()
 
 
 async def _measure(process: psutil.Process, port: int, clients: int, seconds: float) -> Load:

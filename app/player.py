@@ -7,8 +7,8 @@ from typing import Literal
 
 from typing_extensions import TypedDict
 
-from app.frame import Taken
 from app.sources import Source
+from app.taken import Taken
 from app.wire import DeviceJson, Kind, PositionJson
 
 State = Literal["loading", "playing", "paused", "ended", "error"]
@@ -239,5 +239,6 @@ class Player:
         }
         # What is looked at again is not late.
         arrival = time.monotonic() if self._paused else self._source.arrival(self._index)
-        self._hand_over(Taken(scan, position, self._opened, arrival))
+        name = self._source.name or self._source.kind
+        self._hand_over(Taken(scan, name, position, self._opened, arrival))
         return True

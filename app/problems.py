@@ -15,11 +15,15 @@ from app.recorder import RecorderBusyError
 from app.runtime import UnknownCornerError
 from lidarcore import DeviceError, LidarError, TopicError
 from lidarcore.errors import (
+    LandmarkMapError,
+    MapFileError,
     NoAnswerError,
     NoDeviceError,
     PortBusyError,
     PortPermissionError,
     ProtectionStopError,
+    UnknownLandmarkError,
+    UnknownSessionError,
     UnpluggedError,
 )
 
@@ -31,6 +35,7 @@ DEVICE_STATUS = {
     ProtectionStopError: 503,
     UnpluggedError: 503,
 }
+MAP_STATUS = {MapFileError: 422, UnknownLandmarkError: 404, UnknownSessionError: 404}  # else the file fails
 
 
 class ProblemJson(BaseModel):
@@ -105,6 +110,7 @@ def install(app: FastAPI) -> None:
     handle(TopicError, lambda e: ProblemError(409, str(e), topics=list(e.topics)))
     handle(DeviceError, lambda e: ProblemError(DEVICE_STATUS.get(type(e), 422), str(e)))
     handle(RecorderBusyError, lambda e: ProblemError(409, str(e)))
+    handle(LandmarkMapError, lambda e: ProblemError(MAP_STATUS.get(type(e), 503), str(e)))
     handle(LidarError, lambda e: ProblemError(422, str(e)))
     handle(UnknownCornerError, lambda e: ProblemError(404, str(e)))
     handle(Exception, lambda e: ProblemError(500, "An error in the server itself; its log says more."))
@@ -112,12 +118,21 @@ def install(app: FastAPI) -> None:
 
 def _invalid(error: RequestValidationError | ValidationError) -> ProblemError:
     """422 with every error: where it is, as a JSON pointer, and what is wrong."""
-    errors = [
+    errors = pointed_out(error)
+    return ProblemError(422, explained(errors), errors=errors)
+
+
+def pointed_out(error: RequestValidationError | ValidationError) -> list[dict[str, str]]:
+    """Every error: where it is, as a JSON pointer, and what is wrong."""
+    return [
         {"pointer": "/" + "/".join(str(part) for part in e["loc"] if part != "body"), "detail": e["msg"]}
         for e in error.errors()
     ]
-    detail = "; ".join(f"{e['pointer']}: {e['detail']}" for e in errors)
-    return ProblemError(422, detail, errors=errors)
+
+
+def explained(errors: list[dict[str, str]]) -> str:
+    """All of them in a line."""
+    return "; ".join(f"{e['pointer']}: {e['detail']}" for e in errors)
 
 
 def encode(value: object) -> Response:

@@ -9,12 +9,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from app.frame import Frame, Taken
+from app.frame import Frame
+from app.navigation import Navigation
+from app.odometry_feed import OdometryPose
 from app.player import Player
+from app.selection import Selection
 from app.settings import Settings
 from app.sources import Source
+from app.taken import Taken
 from app.tracking import Tracker
-from lidarcore import Features, extract, warm_up
+from app.wire import LocalizationStateJson
+from lidarcore import Features, Scan, extract, localization, warm_up
+from lidarcore.clusters import cluster
 
 logger = logging.getLogger(__name__)
 
@@ -64,9 +70,12 @@ class Slot:
 class Runtime:
     """Owns settings, player, selection and the newest frame. Every method may be called from any thread."""
 
-    def __init__(self, source: Source, settings: Settings, draw: Callable[[Frame], None]) -> None:
+    def __init__(
+        self, source: Source, settings: Settings, navigation: Navigation, draw: Callable[[Frame], None]
+    ) -> None:
         self.settings = settings
-        self.selected: int | None = None
+        self.navigation = navigation
+        self.selection = Selection()
         self.frame: Frame | None = None
         self.ready = False
         self.frame_listeners: list[Callable[[Frame], None]] = []
@@ -96,19 +105,43 @@ class Runtime:
             self.settings = self.settings.patched(patch)
         return self._refreshed()
 
-    def select(self, corner: int | None) -> None:
+    def select_landmark(self, landmark: int | None) -> None:
+        """Select a landmark of the map by its id, or none."""
+        self.selection = replace(self.selection, landmark=landmark)
+        self._refreshed()
+
+    def select_corner(self, corner: int | None) -> None:
         """Select a corner of the current frame, or none. Raises UnknownCornerError."""
         known = {row.id for row in self.frame.corners} if self.frame else set()
         if corner is not None and corner not in known:
             raise UnknownCornerError(
                 f"There is no corner {corner} in the current frame; it has {sorted(known)}."
             )
-        self.selected = corner
+        self.selection = replace(self.selection, corner=corner)
         self._refreshed()
+
+    def navigate(self, change: Callable[[Navigation], None]) -> None:
+        """Change something about localization; what it raises goes through, and then nothing has changed."""
+        change(self.navigation)
+        self._refreshed()
+
+    def localization(self) -> LocalizationStateJson:
+        """What is localized, and in which map."""
+        return {
+            "mode": self.settings.navigation.mode,
+            "session": self.navigation.session,
+            "map": self.navigation.map,
+            "problem": self.navigation.problem,
+        }
+
+    def feed(self, pose: OdometryPose) -> None:
+        """Odometry from outside. Raises MotionError if the clock went back or the pose jumped."""
+        limits = replace(self.settings.navigation.filter, motion="odometry")
+        self.navigation.odometry.put(pose, limits)
 
     def open(self, source: Source, index: int = 0, paused: bool = False) -> None:
         """Play another source."""
-        self.selected = None
+        self.selection = Selection()
         self.player.open(source, index, paused)
 
     def _refreshed(self) -> Settings:
@@ -124,6 +157,7 @@ class Runtime:
     def _work(self) -> None:
         try:
             warm_up()
+            localization.warm_up()
         except Exception:
             logger.exception("the kernels could not be compiled ahead; they will be when they are needed")
         gc.collect()
@@ -151,17 +185,29 @@ class Runtime:
         if taken.source != self._source:
             self._source = taken.source
             self._tracker.forget()
-        features, method_us = _extract_each(taken, settings)
+        scan = self.navigation.deskewed(taken, settings)
+        features, method_us = _extract_each(scan, settings)
+        begin = time.perf_counter()
+        clusters = cluster(scan, settings.clusters) if settings.clustered else None
+        clustered = time.perf_counter()
+        main = next(iter(features.values()))
+        where = self.navigation.step(taken, scan, main, clusters, settings.landmark_method)
+        located = time.perf_counter()
         self._sequence += 1
         return Frame(
             sequence=self._sequence,
             taken=taken,
+            scan=scan,
             settings=settings,
             features=features,
             corners=self._tracker.rows(features),
-            selected=self.selected,
+            selection=self.selection,
             extract_us=sum(method_us.values()),
             method_us=method_us,
+            clusters=clusters,
+            where=where,
+            cluster_us=1e6 * (clustered - begin),
+            locate_us=1e6 * (located - clustered),
             rate_hz=self._rate(),
             dropped=self._slot.dropped,
         )
@@ -183,13 +229,13 @@ class Runtime:
         return (len(self._times) - 1) / span if span else 0.0
 
 
-def _extract_each(taken: Taken, settings: Settings) -> tuple[dict[str, Features], dict[str, float]]:
+def _extract_each(scan: Scan, settings: Settings) -> tuple[dict[str, Features], dict[str, float]]:
     """The features by every method and the time each took, us. The segmentation is the same for all."""
     features, times = {}, {}
     chosen = {name: replace(settings.extraction, fitter=name) for name in settings.methods}
-    extract(taken.scan, settings.extraction)  # after a pause caches are cold, whatever the method
+    extract(scan, settings.extraction)  # after a pause caches are cold, whatever the method
     for name, extraction in chosen.items():
         begin = time.perf_counter()
-        features[name] = extract(taken.scan, extraction)
+        features[name] = extract(scan, extraction)
         times[name] = 1e6 * (time.perf_counter() - begin)
     return features, times

@@ -1,19 +1,20 @@
 """What of a frame is drawn where, and what a click means."""
 
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 from viser import ViserServer
 
 from app.canvas import Canvas
-from app.colours import Rgbs, categorical, method_rgb, rgb, turbo
+from app.colours import Rgbs, categorical, method_rgb, turbo
 from app.frame import Frame
+from app.inks import ink
+from app.picking import Picking
+from app.scene_map import MapLayers
 from app.shapes import (
     ARROW,
     CIRCLE,
     CROSS,
-    Array,
     axis_labels,
     beams_between,
     ellipses,
@@ -23,22 +24,20 @@ from app.shapes import (
 )
 from lidarcore import Features
 
-INKS = {
-    "dark": {"points": "#9fb0c8", "cell": "#1f242c", "section": "#39414d", "label": "#7b8796",
-             "sensor": "#f1f3f5", "rejected": "#ff5c5c", "ring": "#ffe14d"},
-    "light": {"points": "#56657a", "cell": "#eef0f3", "section": "#d0d6de", "label": "#6a7482",
-              "sensor": "#15181c", "rejected": "#c92a2a", "ring": "#b88a00"},
-}  # fmt: skip
-
 
 class Scene:
     """Draws frames for all browsers; call `draw` from one thread."""
 
-    def __init__(self, server: ViserServer, select: Callable[[int], None]) -> None:
-        """`select` is told the id of a corner that someone clicked."""
-        self._server, self._canvas, self._select = server, Canvas(server), select
-        self._canvas.on_click("markers", self._clicked)
-        self._frame: Frame | None = None
+    def __init__(
+        self,
+        server: ViserServer,
+        select_corner: Callable[[int], None],
+        select_landmark: Callable[[int], None],
+    ) -> None:
+        """The functions are told the id of a corner or landmark that someone clicked."""
+        self._server, self._canvas = server, Canvas(server)
+        self._map = MapLayers(self._canvas, self._ink)
+        self._picking = Picking(self._canvas, select_corner, select_landmark)
         self._theme = ""
         self._source = -1
         self._reach = 0.0  # m from the sensor to what it sees
@@ -52,14 +51,16 @@ class Scene:
                 self._draw_gaps,
                 self._draw_segments,
                 self._draw_corners,
+                self._draw_clusters,
                 self._draw_rejected,
             ):
                 draw(frame)
+            self._map.draw(frame, self._reach)
         self._server.flush()
-        self._frame = frame
+        self._picking.frame = frame
 
     def _ink(self, name: str) -> Rgbs:
-        return np.array(rgb(INKS[self._theme][name]), np.uint8)
+        return ink(self._theme, name)
 
     def _prepare(self, frame: Frame) -> None:
         """What changes only with the theme or with the room: sizes, colours of the ground, labels."""
@@ -67,30 +68,30 @@ class Scene:
         if (theme, source) == (self._theme, self._source):
             return
         if source != self._source:
-            distances = np.linalg.norm(frame.taken.scan.xy[frame.taken.scan.valid], axis=1)
+            distances = np.linalg.norm(frame.scan.xy[frame.scan.valid], axis=1)
             self._reach = max(1.0, 1.1 * float(np.percentile(distances, 98))) if len(distances) else 5.0
             self._canvas.fit(self._reach)
         self._theme, self._source = theme, source
-        inks, step = INKS[theme], nice_step(self._reach)
-        self._canvas.paper(theme == "dark", rgb(inks["cell"]), rgb(inks["section"]), float(step))
+        step = nice_step(self._reach)
+        self._canvas.paper(theme == "dark", self._ink("cell"), self._ink("section"), float(step))
         self._canvas.strokes("labels", True, axis_labels(self._reach, step), self._ink("label"))
         self._canvas.strokes("sensor", True, ARROW * self._reach / 40, self._ink("sensor"))
 
     def _draw_scan(self, frame: Frame) -> None:
-        layers, scan = frame.settings.view.layers, frame.taken.scan
+        layers, scan = frame.settings.view.layers, frame.scan
         self._canvas.points("points", layers.points, scan.xy[scan.valid], self._point_colours(frame))
         for name, visible in (("grid", layers.grid), ("labels", layers.grid), ("sensor", layers.sensor)):
             self._canvas.visible(name, visible)
 
     def _draw_gaps(self, frame: Frame) -> None:
         """The sectors whose data were lost on the way, as wedges."""
-        outlines = [wedge(start, end) * self._reach for start, end in frame.taken.scan.gaps.tolist()]
+        outlines = [wedge(start, end) * self._reach for start, end in frame.scan.gaps.tolist()]
         strokes = polylines(np.array(outlines).reshape(-1, *CIRCLE.shape))
         self._canvas.strokes("gaps", frame.settings.view.layers.gaps, strokes, self._ink("rejected"))
 
     def _point_colours(self, frame: Frame) -> Rgbs:
         """One colour (3,) for all points, or (N, 3)."""
-        scan, mode = frame.taken.scan, frame.settings.view.colour
+        scan, mode = frame.scan, frame.settings.view.colour
         if mode == "range":
             return turbo(scan.ranges[scan.valid] / self._reach)
         if mode == "quality" and scan.quality is not None:
@@ -102,7 +103,7 @@ class Scene:
 
     def _segment_colours(self, frame: Frame) -> Rgbs:
         """Every point in the colour of the segment it belongs to (N, 3)."""
-        scan, segments = frame.taken.scan, frame.main.segments
+        scan, segments = frame.scan, frame.main.segments
         colours = np.tile(self._ink("points"), (len(scan), 1))
         ends = zip(segments.first_beam.tolist(), segments.last_beam.tolist(), strict=True)
         for colour, (first, last) in zip(categorical(len(segments)), ends, strict=True):
@@ -136,12 +137,12 @@ class Scene:
         return np.concatenate([np.tile(method_rgb(name, self._theme), (n, 1)) for name, n in counts.items()])
 
     def _draw_ring(self, frame: Frame) -> None:
-        where = [xy for id_, xy in frame.corner_positions() if id_ == frame.selected]
+        where = [xy for id_, xy in frame.corner_positions() if id_ == frame.selection.corner]
         rings = np.array([CIRCLE * self._reach / 28 + xy for xy in where]).reshape(-1, *CIRCLE.shape)
         self._canvas.strokes("ring", True, polylines(rings), self._ink("ring"))
 
     def _draw_rejected(self, frame: Frame) -> None:
-        wanted, scan = frame.settings.view.layers.rejected, frame.taken.scan
+        wanted, scan = frame.settings.view.layers.rejected, frame.scan
         rejections = list(frame.main.rejections) if wanted else []
         pieces = [beams_between(scan, r.first_beam, r.last_beam) for r in rejections if r.kind == "segment"]
         points = scan.xy[np.concatenate(pieces)] if pieces else np.empty((0, 2))
@@ -150,19 +151,17 @@ class Scene:
         self._canvas.points("rejected", wanted, points, self._ink("rejected"))
         self._canvas.strokes("crosses", wanted, strokes, self._ink("rejected"))
 
-    def _clicked(self, event: Any) -> None:
-        """Select the corner nearest to where the ray meets the floor."""
-        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-        if self._frame is None or not np.isfinite([origin, direction]).all() or direction[2] == 0:
-            return
-        floor = (origin - direction * origin[2] / direction[2])[:2]
-        positions = self._frame.corner_positions()
-        if positions:
-            self._select(min(positions, key=lambda row: _distance(row[1], floor))[0])
-
-
-def _distance(a: Array, b: Array) -> float:
-    return float(np.linalg.norm(a - b))
+    def _draw_clusters(self, frame: Frame) -> None:
+        """Where the members of each cluster lie: two sigma of their scatter."""
+        found = frame.clusters
+        visible = frame.settings.view.layers.clusters and found is not None
+        means, scatters = (found.means, found.scatters) if found else (np.empty((0, 2)), np.empty((0, 2, 2)))
+        half, angle, outline = ellipses(means, scatters, 2.0)
+        half = np.maximum(half, self._reach / 200)  # members in a line have an ellipse without a width
+        self._canvas.discs(
+            "cluster fill", visible, means, half, angle, np.tile(self._ink("cluster"), (len(means), 1))
+        )
+        self._canvas.strokes("clusters", visible, polylines(outline), self._ink("cluster"))
 
 
 def _main_on_top(frame: Frame) -> Iterator[tuple[str, Features]]:

@@ -37,8 +37,10 @@ HEADERS = {
 class Guard:
     """ASGI middleware: host, origin, token, size of the body, and the headers of every answer."""
 
-    def __init__(self, app: ASGIApp, hosts: Collection[str], token: str | None, uploads: str) -> None:
-        """Names in `hosts` are ours besides localhost; PUT under `uploads` bounds its body itself."""
+    def __init__(
+        self, app: ASGIApp, hosts: Collection[str], token: str | None, uploads: str | tuple[str, ...]
+    ) -> None:
+        """Names in `hosts` are ours besides localhost; PUT and POST under `uploads` bound their bodies themselves."""
         self._app, self._token, self._uploads = app, token, uploads
         self._hosts = {"localhost", *(host.lower() for host in hosts)}
 
@@ -103,7 +105,7 @@ class Guard:
         return self._token is not None and secrets.compare_digest(given.encode(), self._token.encode())
 
     def _is_upload(self, scope: Scope) -> bool:
-        return scope.get("method") == "PUT" and scope["path"].startswith(self._uploads)
+        return scope.get("method") in ("PUT", "POST") and scope["path"].startswith(self._uploads)
 
 
 def _hostname(host: str) -> str:

@@ -5,16 +5,34 @@ from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
+from tempfile import mkdtemp
 
 from fastapi import APIRouter, FastAPI
 from fastapi.staticfiles import StaticFiles
 from starlette.responses import FileResponse
 
 from app import problems
-from app.api import docs, frame, meta, recorder, recordings, selection, sensor, settings, source
+from app.api import (
+    clusters,
+    docs,
+    frame,
+    landmarks,
+    localization,
+    map,
+    meta,
+    recorder,
+    recordings,
+    selection,
+    sensor,
+    sessions,
+    settings,
+    source,
+)
+from app.landmark_store import LandmarkStore
 from app.library import MAX_BYTES, Library
 from app.live import DeviceOptions, Taps, connected_or_emulated
 from app.metrics import Metrics, metrics_router
+from app.navigation import Navigation
 from app.recorder import AsyncRecorder
 from app.runtime import Runtime, UnknownCornerError
 from app.scene import Scene
@@ -24,8 +42,14 @@ from app.sources import RecordingSource, Source
 from app.stream import Hub
 from app.viser_mount import ViserMount
 from lidarcore import Scan, extract
+from lidarcore.errors import LandmarkMapError
 
 API = "/api/v1"
+MAP_FILE = "landmarks.db"
+ROOMS = (
+    frame, clusters, localization, landmarks, map, sessions, settings, source, sensor, recordings, recorder,
+    selection, meta,
+)  # fmt: skip
 STATIC = Path(str(resources.files("app"))).parent / "static"
 
 
@@ -36,6 +60,7 @@ class ServerOptions:
     recordings: Path = Path("recordings")
     recording: Path | None = None
     topic: str | None = None
+    map: str | None = None
     device: DeviceOptions = field(default_factory=DeviceOptions)
     say: Callable[[str], None] = lambda sentence: None
     settings: Settings = field(default_factory=Settings)
@@ -50,9 +75,14 @@ def create_app(options: ServerOptions) -> FastAPI:
     taps = Taps(scan=lambda scan: _record(recording, runtime, scan), bytes=recording.tap)
     first = _first_source(options, taps)
     mount = ViserMount()
-    scene = Scene(mount.server, lambda corner: _try_to_select(runtime, corner))
-    runtime = Runtime(first, options.settings, scene.draw)
-    hub = Hub(runtime, recording, measured.sent)
+    scene = Scene(
+        mount.server,
+        lambda corner: _try_to_select(runtime, corner),
+        lambda landmark: runtime.select_landmark(landmark),
+    )
+    store = _landmark_store(options)
+    runtime = Runtime(first, options.settings, Navigation(store), scene.draw)
+    hub = Hub(runtime, recording, store, measured.sent)
     measured.watch(runtime, hub, recording)
 
     @asynccontextmanager
@@ -63,6 +93,7 @@ def create_app(options: ServerOptions) -> FastAPI:
         hub.close()
         runtime.close()
         recording.stop()
+        store.close()
         mount.close()
 
     app = FastAPI(
@@ -76,19 +107,32 @@ def create_app(options: ServerOptions) -> FastAPI:
     )
     app.state.runtime, app.state.hub, app.state.viser = runtime, hub, mount.server
     app.state.library = Library(options.recordings, options.max_bytes, options.recording)
-    app.state.recorder, app.state.taps = recording, taps
+    app.state.recorder, app.state.taps, app.state.landmarks = recording, taps, store
     problems.install(app)
     problems.document(app)
     api = APIRouter(prefix=API)
-    for module in (frame, settings, source, sensor, recordings, recorder, selection, meta):
+    for module in ROOMS:
         api.include_router(module.router)
     app.include_router(api)
     app.include_router(docs.router)
     app.include_router(metrics_router(measured))
     mount.install(app)
     _add_page(app)
-    app.add_middleware(Guard, hosts=options.hosts, token=options.token, uploads=f"{API}/recordings/")
+    app.add_middleware(
+        Guard, hosts=options.hosts, token=options.token, uploads=(f"{API}/recordings/", f"{API}/map")
+    )
     return app
+
+
+def _landmark_store(options: ServerOptions) -> LandmarkStore:
+    """The file of maps given, else one beside the folder of recordings, or one that ends with the server."""
+    if options.map is not None:
+        return LandmarkStore(options.map)
+    try:
+        return LandmarkStore(options.recordings.parent / MAP_FILE)
+    except LandmarkMapError as error:
+        options.say(f"{error} Maps are lost when the server ends; give a file for --map to keep them.")
+        return LandmarkStore(Path(mkdtemp(prefix="lidarcore-")) / MAP_FILE)
 
 
 def _first_source(options: ServerOptions, taps: Taps) -> Source:
@@ -110,7 +154,7 @@ def _record(recording: AsyncRecorder, runtime: Runtime, scan: Scan) -> None:
 def _try_to_select(runtime: Runtime, corner: int) -> None:
     """A click may come after its corner has gone."""
     with suppress(UnknownCornerError):
-        runtime.select(corner)
+        runtime.select_corner(corner)
 
 
 def _add_page(app: FastAPI) -> None:

@@ -1,12 +1,15 @@
 """Everything a user can set: one frozen object, swapped whole, changed only through `Settings.patched`."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails, to_json
 
 from lidarcore import FITTERS, ExtractionSettings
+from lidarcore.clusters import ClusterSettings
+from lidarcore.localization import NavigationSettings
 
 Colour = Literal["plain", "segment", "quality", "range"]
 
@@ -26,6 +29,17 @@ class Layers(_Frozen):
     grid: Annotated[bool, Field(description="grid in metres")] = True
     sensor: Annotated[bool, Field(description="the sensor")] = True
     gaps: Annotated[bool, Field(description="sectors lost on the way from the sensor")] = True
+    clusters: Annotated[bool, Field(description="clusters, each with the ellipse of its members")] = False
+    pose: Annotated[bool, Field(description="the ellipse of the sensor's position")] = True
+    trail: Annotated[bool, Field(description="where the sensor has been")] = True
+    dead_reckoned: Annotated[bool, Field(description="where odometry alone says it has been")] = True
+    truth: Annotated[bool, Field(description="where it truly has been, if that is known")] = True
+    landmarks: Annotated[bool, Field(description="landmarks of the map with their ellipses and numbers")] = (
+        True
+    )
+    associations: Annotated[
+        bool, Field(description="lines from what is seen to the landmark it is taken for")
+    ] = True
 
 
 class ViewSettings(_Frozen):
@@ -58,9 +72,14 @@ class ViewSettings(_Frozen):
 
 
 class Settings(_Frozen):
-    """All settings: of the extraction and of the view."""
+    """All settings: of the extraction, of the clusters, of localization and of the view.
+
+    There is one sensor, so `clusters.noise` always is `extraction.noise`.
+    """
 
     extraction: ExtractionSettings = ExtractionSettings()
+    clusters: ClusterSettings = ClusterSettings()
+    navigation: NavigationSettings = NavigationSettings()
     view: ViewSettings = ViewSettings()
 
     @property
@@ -68,6 +87,21 @@ class Settings(_Frozen):
         """The fitters to run, the main one first."""
         extra = self.view.methods if self.view.compare else ()
         return tuple(dict.fromkeys((self.extraction.fitter, *extra)))
+
+    @property
+    def clustered(self) -> bool:
+        """Whether scans are clustered: to be shown, or as landmarks."""
+        return self.view.layers.clusters or self.navigation.landmarks == "clusters"
+
+    @property
+    def landmark_method(self) -> str:
+        """What finds the landmarks in a scan: the fitter of the walls that meet in corners, or the clustering."""
+        return self.extraction.fitter if self.navigation.landmarks == "corners" else self.clusters.method
+
+    @model_validator(mode="after")
+    def _one_noise(self) -> Self:
+        object.__setattr__(self, "clusters", replace(self.clusters, noise=self.extraction.noise))
+        return self
 
     def patched(self, patch: Mapping[str, Any]) -> "Settings":
         """These settings with a JSON merge patch (RFC 7396) applied; null puts the default back.

@@ -2,15 +2,30 @@
 
 import asyncio
 from collections.abc import Callable
+from dataclasses import asdict
+from typing import Literal
 
+from pydantic import ValidationError
 from pydantic_core import to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.frame import Frame
+from app.landmark_store import LandmarkStore
+from app.map_news import MapNews
+from app.map_writer import MapChange
+from app.odometry_feed import OdometryPose
+from app.problems import explained, pointed_out
 from app.recorder import AsyncRecorder
 from app.runtime import Runtime
+from lidarcore.errors import LocalizationError
 
 TICK = 0.5  # s
+
+
+class OdometryMessage(OdometryPose):
+    """What a client may send: a pose, with its type."""
+
+    type: Literal["odometry"]
 
 
 class Mailbox:
@@ -21,6 +36,11 @@ class Mailbox:
         self._news = asyncio.Event()
         self._state_changed = False
         self._frame: Frame | None = None
+        self._changes = MapNews()
+
+    def put_change(self, change: MapChange) -> None:
+        self._changes.add(change)
+        self._news.set()
 
     def put_state(self) -> None:
         self._state_changed = True
@@ -37,6 +57,9 @@ class Mailbox:
         changed, self._state_changed = self._state_changed, False
         frame, self._frame = self._frame, None
         messages = [state()] if changed else []
+        if self._changes:
+            changes, self._changes = self._changes, MapNews()
+            messages.append(_message("landmarks", changes.text()))
         if frame is not None:
             messages.append(_message("frame", frame.text_with_points if self._points else frame.text))
         return messages, frame
@@ -45,12 +68,19 @@ class Mailbox:
 class Hub:
     """Hands what the runtime's threads produce to the clients on the event loop."""
 
-    def __init__(self, runtime: Runtime, recorder: AsyncRecorder, sent: Callable[[Frame], None]) -> None:
+    def __init__(
+        self,
+        runtime: Runtime,
+        recorder: AsyncRecorder,
+        landmarks: LandmarkStore,
+        sent: Callable[[Frame], None],
+    ) -> None:
         """`sent` is told of every frame that was handed to a browser's socket."""
         self._runtime, self._recorder, self._sent = runtime, recorder, sent
         self._mailboxes: set[Mailbox] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         runtime.frame_listeners.append(lambda frame: self._post(Mailbox.put_frame, frame))
+        landmarks.listeners.append(lambda change: self._post(Mailbox.put_change, change))
         runtime.change_listeners.append(lambda: self._post(Mailbox.put_state))
 
     @property
@@ -72,7 +102,8 @@ class Hub:
         state = {
             "settings": runtime.settings.model_dump(),
             "source": runtime.player.describe(),
-            "selection": {"corner": runtime.selected},
+            "selection": asdict(runtime.selection),
+            "localization": runtime.localization(),
             "recorder": self._recorder.status,
             "ready": runtime.ready,
         }
@@ -86,7 +117,7 @@ class Hub:
             mailbox.put_frame(self._runtime.frame)
         self._mailboxes.add(mailbox)
         sender = asyncio.create_task(self._send(websocket, mailbox))
-        receiver = asyncio.create_task(_ignore(websocket))
+        receiver = asyncio.create_task(self._receive(websocket))
         try:
             await asyncio.wait((sender, receiver), return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -102,6 +133,19 @@ class Hub:
                 await websocket.send_text(message)
             if frame is not None:
                 self._sent(frame)
+
+    async def _receive(self, websocket: WebSocket) -> None:
+        """Take odometry; say what is wrong with anything else, and go on until the client goes."""
+        try:
+            while (message := await websocket.receive())["type"] != "websocket.disconnect":
+                try:
+                    self._runtime.feed(OdometryMessage.model_validate_json(message.get("text") or ""))
+                except ValidationError as error:
+                    await websocket.send_text(_refusal(explained(pointed_out(error))))
+                except LocalizationError as error:
+                    await websocket.send_text(_refusal(str(error)))
+        except (WebSocketDisconnect, RuntimeError):
+            return
 
     async def _tick(self) -> None:
         """The counters of a live source, and the size of a recording, change all the time."""
@@ -120,13 +164,9 @@ class Hub:
             put(mailbox, *args)
 
 
-async def _ignore(websocket: WebSocket) -> None:
-    """Read and forget what the client says, to notice when it goes."""
-    try:
-        while True:
-            await websocket.receive()
-    except (WebSocketDisconnect, RuntimeError):
-        return
+def _refusal(detail: str) -> str:
+    problem = {"title": "This message was left out", "detail": detail}
+    return _message("error", to_json(problem).decode())
 
 
 def _message(kind: str, json: str) -> str:

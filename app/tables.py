@@ -1,6 +1,6 @@
 """Segments and corners as flat columns: one declaration for CSV over REST and for `lidarcore process`."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from lidarcore import Features
 
@@ -44,7 +44,7 @@ def corner_columns(features: Features) -> Columns:
     }
 
 
-def csv_text(columns: dict[str, Iterable[object]]) -> str:
+def csv_text(columns: Mapping[str, Iterable[object]]) -> str:
     """The columns as CSV (RFC 4180) with a header; floats round-trip."""
     lines = [",".join(columns), *(",".join(map(str, row)) for row in zip(*columns.values(), strict=True))]
     return "\r\n".join(lines) + "\r\n"

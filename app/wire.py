@@ -6,7 +6,8 @@ from typing_extensions import TypedDict
 
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
-Kind = Literal["device", "emulator", "recording"]
+Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+Kind = Literal["device", "emulator", "simulation", "recording"]
 
 
 class DeviceJson(TypedDict):
@@ -84,9 +85,74 @@ class SummaryJson(TypedDict):
     median_area: float | None
 
 
+class ClusterJson(TypedDict):
+    """A cluster in the sensor frame: `covariance` is of its mean, `scatter` of its members about it, m²."""
+
+    x: float
+    y: float
+    covariance: Matrix
+    scatter: Matrix
+    count: int
+
+
+class PoseJson(TypedDict):
+    """T_world_sensor."""
+
+    x: float
+    y: float
+    heading: float
+
+
+class InnovationJson(TypedDict):
+    """Observed minus expected position of one landmark, sensor frame, m; null until the landmark is in the file."""
+
+    landmark: int | None
+    dx: float
+    dy: float
+    squared_distance: float
+
+
+class LocalizationJson(TypedDict):
+    """Where the sensor is after this scan, and what the filter made of it.
+
+    `landmarks` counts those of the map, `observed` the points seen; `nis` is chi-square distributed with `dof`
+    degrees of freedom, `nis_band` holds 95 % of it; `truth` is what a simulator or a reference says, if there is one.
+    """
+
+    mode: Literal["localize", "slam"]
+    state: Literal["starting", "tracking", "coasting", "lost"]
+    message: str | None
+    session: int | None
+    pose: PoseJson
+    covariance: Matrix3
+    velocity: Pair | None
+    dead_reckoned: PoseJson | None
+    truth: tuple[float, float, float | None] | None
+    landmarks: int
+    confirmed: int
+    observed: int
+    ambiguous: int
+    unmatched: int
+    innovations: list[InnovationJson]
+    nis: float
+    dof: int
+    nis_band: Pair
+
+
+class LocalizationStateJson(TypedDict):
+    """`session` is built or localized in; `map` was chosen to localize in, null for the newest with landmarks."""
+
+    mode: Literal["off", "localize", "slam"]
+    session: int | None
+    map: int | None
+    problem: str | None
+
+
 class TimingsJson(TypedDict):
     extract_us: float
     per_method: dict[str, float]
+    cluster_us: float
+    locate_us: float
     draw_us: float
     age_ms: float
 
@@ -110,4 +176,6 @@ class FrameJson(TypedDict):
     corners: list[CornerJson]
     rejections: list[RejectionJson]
     summary: dict[str, SummaryJson]
+    clusters: list[ClusterJson] | None
+    localization: LocalizationJson | None
     points: NotRequired[list[Pair]]

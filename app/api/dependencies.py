@@ -6,6 +6,7 @@ from fastapi import Depends
 from starlette.requests import HTTPConnection
 
 from app.frame import Frame
+from app.landmark_store import LandmarkStore
 from app.library import Library
 from app.live import Taps
 from app.problems import ProblemError
@@ -39,6 +40,11 @@ def _taps(connection: HTTPConnection) -> Taps:
     return taps
 
 
+async def _landmarks(connection: HTTPConnection) -> LandmarkStore:
+    landmarks: LandmarkStore = connection.app.state.landmarks
+    return landmarks
+
+
 def _frame(runtime: Annotated[Runtime, Depends(_runtime)]) -> Frame:
     if runtime.frame is None:
         why = "no scan has been processed" if runtime.ready else "the kernels are still being compiled"
@@ -51,4 +57,5 @@ CurrentLibrary = Annotated[Library, Depends(_library)]
 CurrentHub = Annotated[Hub, Depends(_hub)]
 CurrentRecorder = Annotated[AsyncRecorder, Depends(_recorder)]
 CurrentTaps = Annotated[Taps, Depends(_taps)]
+CurrentLandmarks = Annotated[LandmarkStore, Depends(_landmarks)]
 CurrentFrame = Annotated[Frame, Depends(_frame)]

@@ -69,6 +69,33 @@ RECORDER = {
     "error": None,
 }
 POSITION = {"kind": "recording", "index": 41, "count": 278, "time": 4.1}
+CLUSTER = {
+    "x": 2.104,
+    "y": 0.371,
+    "covariance": [[2.1e-06, 3.0e-07], [3.0e-07, 4.4e-06]],
+    "scatter": [[0.0031, 0.0002], [0.0002, 0.0108]],
+    "count": 41,
+}
+LOCALIZATION = {
+    "mode": "slam",
+    "state": "tracking",
+    "message": None,
+    "session": 3,
+    "pose": {"x": 1.204, "y": -0.311, "heading": 0.52},
+    "covariance": [[0.0004, 0.0, 0.0], [0.0, 0.0004, 0.0], [0.0, 0.0, 0.0001]],
+    "velocity": [0.31, 0.02],
+    "dead_reckoned": {"x": 1.251, "y": -0.302, "heading": 0.54},
+    "truth": [1.203, -0.309, 0.5192],
+    "landmarks": 24,
+    "confirmed": 19,
+    "observed": 13,
+    "ambiguous": 0,
+    "unmatched": 2,
+    "innovations": [{"landmark": 7, "dx": 0.0041, "dy": -0.0017, "squared_distance": 1.4}],
+    "nis": 1.4,
+    "dof": 2,
+    "nis_band": [0.051, 7.378],
+}
 FRAME: Json = {
     "sequence": 1042,
     "stamp": 1321462573.81,
@@ -81,7 +108,14 @@ FRAME: Json = {
     "fitter": "ml",
     "covariance": "consistent",
     "methods": ["ml"],
-    "timings": {"extract_us": 131.0, "per_method": {"ml": 22.0}, "draw_us": 690.0, "age_ms": 1.2},
+    "timings": {
+        "extract_us": 131.0,
+        "per_method": {"ml": 22.0},
+        "cluster_us": 310.0,
+        "locate_us": 640.0,
+        "draw_us": 690.0,
+        "age_ms": 1.2,
+    },
     "rate_hz": 10.0,
     "dropped": 0,
     "segments": {"ml": [SEGMENT]},
@@ -97,6 +131,8 @@ FRAME: Json = {
         }
     ],
     "summary": {"ml": {"corners": 1, "median_area": 4.3e-05}},
+    "clusters": [CLUSTER],
+    "localization": LOCALIZATION,
 }
 SOURCE = {
     "kind": "recording",
@@ -122,6 +158,27 @@ RECORDING = {
     "size": 10485760,
     "modified": "2025-04-01T10:00:00+00:00",
     "builtin": False,
+}
+LANDMARK = {
+    "id": 41,
+    "x": 3.502,
+    "y": -1.798,
+    "var_x": 2.1e-05,
+    "cov_xy": -3.4e-06,
+    "var_y": 1.8e-05,
+    "kind": "corner",
+    "method": "ml",
+    "count": 212,
+    "first_seen": 1795255000.1,
+    "last_seen": 1795255031.4,
+}
+SESSION = {
+    "id": 3,
+    "source": "emulated RPLIDAR S1",
+    "mode": "slam",
+    "started": 1795255000.0,
+    "ended": None,
+    "landmarks": 27,
 }
 SETTINGS_PATCH = {"extraction": {"fitter": "wctls", "min_points": 8}, "view": {"compare": True}}
 

@@ -12,6 +12,7 @@ from app.api.dependencies import CurrentHub, CurrentRuntime
 from app.api.examples import ok
 from app.colours import METHOD_COLOURS
 from lidarcore import FITTERS
+from lidarcore.clusters import CLUSTERERS
 
 router = APIRouter(tags=["meta"])
 
@@ -42,8 +43,19 @@ class FitterJson(TypedDict):
     colour: str
 
 
+class ClustererJson(TypedDict):
+    """`parameters` are those of the settings of clusters that only this method, or few, use."""
+
+    name: str
+    title: str
+    reference: str
+    summary: str
+    parameters: list[str]
+
+
 class MethodsJson(TypedDict):
     fitters: list[FitterJson]
+    clusterers: list[ClustererJson]
     covariances: list[str]
 
 
@@ -57,6 +69,16 @@ METHODS: MethodsJson = {
             "colour": METHOD_COLOURS[fitter.name],
         }
         for fitter in FITTERS.values()
+    ],
+    "clusterers": [
+        {
+            "name": clusterer.name,
+            "title": clusterer.title,
+            "reference": clusterer.reference,
+            "summary": clusterer.summary,
+            "parameters": [name for name in clusterer.parameters if name != "noise"],
+        }
+        for clusterer in CLUSTERERS.values()
     ],
     "covariances": ["consistent", "published"],
 }
@@ -98,7 +120,7 @@ def version() -> VersionJson:
 
 @router.get("/methods", responses=ok(METHODS, "The methods"))
 def methods() -> MethodsJson:
-    """The line fitters and the kinds of covariance there are."""
+    """The line fitters, the clustering methods and the kinds of covariance there are."""
     return METHODS
 
 

@@ -42,13 +42,17 @@ def start(
 ) -> RecorderJson:
     """Record the live source from now on into the recordings folder, as MCAP that ROS 2 tools open."""
     source = runtime.player.source
-    if not isinstance(source, LiveSource):
-        raise ProblemError(409, "A recording plays: only a device or the emulator can be recorded.")
+    if not source.live:
+        raise ProblemError(409, "A recording plays: only what is live can be recorded.")
+    sensor = source if isinstance(source, LiveSource) else None
+    if start.raw and sensor is None:
+        raise ProblemError(409, "A simulation has no port: there are no bytes to record, leave raw out.")
     name = start.name or f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
     path = library.new(name if name.endswith(SUFFIX) else name + SUFFIX)
     raw = library.new(path.stem + RAW_SUFFIX) if start.raw else None
     scale = runtime.settings.view.ellipse_scale
-    recorder.start(path, raw=raw, stream=source.stream, sensor=source.device()["name"], ellipse_scale=scale)
+    stream, model = (sensor.stream, sensor.device()["name"]) if sensor else (None, "simulated robot")
+    recorder.start(path, raw=raw, stream=stream, sensor=model, ellipse_scale=scale)
     runtime.announce()
     return recorder.status
 

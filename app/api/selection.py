@@ -1,9 +1,9 @@
-"""The selected corner, shared by all pages."""
+"""The selected corner and landmark, shared by all pages."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
 from fastapi import APIRouter, Body
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from app.api.dependencies import CurrentRuntime
 from app.api.examples import ok
@@ -11,24 +11,37 @@ from app.problems import documented
 
 router = APIRouter(prefix="/selection", tags=["selection"])
 
-EXAMPLE = {"corner": 12}
+EXAMPLE = {"corner": 12, "landmark": None}
 
 
-class Selection(BaseModel):
-    """The id of a corner in the frame, or null."""
+class SelectionBody(BaseModel):
+    """Ids of a corner in the frame and of a landmark of the map, or null; what is left out stays."""
 
     model_config = ConfigDict(extra="forbid", strict=True)
-    corner: int | None
+    corner: int | None = None
+    landmark: int | None = None
+
+    @model_validator(mode="after")
+    def _names_something(self) -> Self:
+        if not self.model_fields_set:
+            raise ValueError("give corner, landmark or both")
+        return self
 
 
-@router.get("", responses=ok(EXAMPLE, "The selected corner"))
-def read(runtime: CurrentRuntime) -> Selection:
-    """Which corner is selected, if any."""
-    return Selection(corner=runtime.selected)
+@router.get("", responses=ok(EXAMPLE, "What is selected"))
+def read(runtime: CurrentRuntime) -> SelectionBody:
+    """Which corner and which landmark are selected, if any."""
+    return SelectionBody(corner=runtime.selection.corner, landmark=runtime.selection.landmark)
 
 
-@router.put("", responses=ok(EXAMPLE, "The selected corner") | documented(404, 422))
-def select(runtime: CurrentRuntime, selection: Annotated[Selection, Body(examples=[EXAMPLE])]) -> Selection:
-    """Select a corner of the current frame by its id, or none."""
-    runtime.select(selection.corner)
-    return Selection(corner=runtime.selected)
+@router.put("", responses=ok(EXAMPLE, "What is selected") | documented(404, 422))
+def select(
+    runtime: CurrentRuntime,
+    selection: Annotated[SelectionBody, Body(examples=[{"corner": 12}])],
+) -> SelectionBody:
+    """Select a corner of the current frame or a landmark of the map by its id, or none."""
+    if "corner" in selection.model_fields_set:
+        runtime.select_corner(selection.corner)
+    if "landmark" in selection.model_fields_set:
+        runtime.select_landmark(selection.landmark)
+    return read(runtime)

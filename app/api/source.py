@@ -1,9 +1,10 @@
 """What plays: a sensor, the emulator or a recording, and the transport controls."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Body
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from typing_extensions import TypedDict
 
 from app.api.dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime, CurrentTaps
 from app.api.examples import SOURCE, ok
@@ -11,8 +12,11 @@ from app.live import DeviceOptions, LiveSource, Taps
 from app.player import SourceJson
 from app.problems import documented
 from app.runtime import Runtime
+from app.simulated import SimulationSource
 from app.sources import RecordingSource, Source
 from lidarcore import DeviceError
+from lidarcore.simulation.settings import SimulationSettings
+from lidarcore.simulation.worlds import WORLDS
 
 router = APIRouter(prefix="/source", tags=["source"])
 
@@ -48,6 +52,14 @@ class Emulator(_Body):
     rpm: Rpm = None
 
 
+class Simulation(BaseModel):
+    """A simulated robot with odometry, whose true pose is known; GET /source/simulation describes its settings."""
+
+    model_config = ConfigDict(extra="forbid")
+    kind: Literal["simulation"]
+    settings: SimulationSettings = Field(default_factory=SimulationSettings)
+
+
 class Recording(_Body):
     """A recording of the folder."""
 
@@ -77,16 +89,40 @@ class Step(_Body):
 
 
 Choice = Annotated[
-    Device | Emulator | Recording,
+    Device | Emulator | Simulation | Recording,
     Body(
         discriminator="kind",
         examples=[
             {"kind": "device", "port": "/dev/ttyUSB0"},
+            {"kind": "simulation", "settings": {"world": "two rooms"}},
             {"kind": "emulator"},
             {"kind": "recording", "name": "demo.bag"},
         ],
     ),
 ]
+
+
+class WorldJson(TypedDict):
+    name: str
+    title: str
+    paths: list[str]
+
+
+class SimulationJson(TypedDict):
+    """`schema` is a JSON schema of the settings: meaning, unit, range and default of each."""
+
+    worlds: list[WorldJson]
+    schema: dict[str, Any]
+
+
+_SIMULATION = TypeAdapter(SimulationSettings)
+SIMULATION: SimulationJson = {
+    "worlds": [
+        {"name": name, "title": place.title, "paths": list(place.paths)} for name, place in WORLDS.items()
+    ],
+    "schema": _SIMULATION.json_schema()
+    | {"default": _SIMULATION.dump_python(SimulationSettings(), mode="json")},
+}
 
 
 @router.get("", responses=ok(SOURCE, "What plays, where it is, and how"))
@@ -110,12 +146,20 @@ def play(
     if isinstance(choice, Recording):
         source: Source = RecordingSource(library.path(choice.name), choice.topic)
         index, paused = choice.index, choice.paused
+    elif isinstance(choice, Simulation):
+        source, index, paused = SimulationSource(choice.settings, taps.scan), 0, False
     else:
         options = DeviceOptions(**choice.model_dump(exclude={"kind"}), emulated=choice.kind == "emulator")
         source, index, paused = _live(runtime, options, taps), 0, False
     recorder.stop()
     runtime.open(source, index, paused)
     return runtime.player.describe()
+
+
+@router.get("/simulation", responses=ok(SIMULATION, "Worlds, and a JSON schema of the settings"))
+def simulation() -> SimulationJson:
+    """Where a simulated robot can drive, and what can be set about it."""
+    return SIMULATION
 
 
 def _live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> LiveSource:

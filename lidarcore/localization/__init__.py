@@ -17,6 +17,7 @@ from lidarcore.localization.settings import (
 )
 from lidarcore.localization.slam import Slam
 from lidarcore.localization.stored import from_stored, to_stored
+from lidarcore.localization.warming import warm_up
 from lidarcore.localization.whereabouts import Whereabouts
 
 __all__ = [
@@ -38,4 +39,5 @@ __all__ = [
     "from_stored",
     "relocalize",
     "to_stored",
+    "warm_up",
 ]

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -29,7 +30,9 @@ class Server:
     """A server in a thread: its address, a client, and its inside for what cannot be seen from outside."""
 
     def __init__(self, folder: Path, **options: Any) -> None:
-        app = create_app(ServerOptions(recordings=folder, **options))
+        self._maps = TemporaryDirectory()
+        maps = {"map": str(Path(self._maps.name) / "landmarks.db")}
+        app = create_app(ServerOptions(recordings=folder, **maps | options))
         self.runtime: Runtime = app.state.runtime
         self.viser: viser.ViserServer = app.state.viser
         self.folder = folder
@@ -48,6 +51,7 @@ class Server:
         self._server.should_exit = True
         self._thread.join(timeout=10)
         assert not self._thread.is_alive(), "the server did not stop"
+        self._maps.cleanup()
 
     def get(self, path: str, **params: Any) -> Any:
         return self.http.get(path, params=params).raise_for_status().json()

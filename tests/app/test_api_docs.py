@@ -9,15 +9,19 @@ from pydantic import TypeAdapter, ValidationError
 from serving import Json, Server, strict_json
 
 import lidarcore
+from app.api.landmarks import LandmarkHistoryJson, LandmarksJson, NeighboursJson
+from app.api.localization import TrajectoryJson, WhereJson
 from app.api.meta import HealthJson, MethodsJson, VersionJson
 from app.api.recordings import RecordingsJson
-from app.api.selection import Selection
+from app.api.selection import SelectionBody
 from app.api.sensor import FoundDeviceJson
+from app.api.sessions import SessionJson, SessionsJson
+from app.api.source import SimulationJson
 from app.library import RecordingJson
 from app.player import SourceJson
 from app.recorder import RecorderJson
 from app.settings import Settings
-from app.wire import CornerJson, FrameJson, SegmentJson
+from app.wire import ClusterJson, CornerJson, FrameJson, LocalizationStateJson, SegmentJson
 
 TYPES = {
     ("get", "/health"): HealthJson,
@@ -38,12 +42,29 @@ TYPES = {
     ("post", "/recorder/start"): RecorderJson,
     ("post", "/recorder/stop"): RecorderJson,
     ("get", "/metrics"): None,
+    ("get", "/landmarks"): LandmarksJson,
+    ("get", "/landmarks/nearest"): NeighboursJson,
+    ("get", "/landmarks/{id}"): LandmarkHistoryJson,
+    ("delete", "/landmarks"): None,
+    ("get", "/sessions"): SessionsJson,
+    ("delete", "/sessions/{id}"): None,
+    ("get", "/map"): dict,
+    ("post", "/map"): SessionJson,
     ("get", "/source"): SourceJson,
     ("put", "/source"): SourceJson,
     ("patch", "/source"): SourceJson,
     ("post", "/source/step"): SourceJson,
-    ("get", "/selection"): Selection,
-    ("put", "/selection"): Selection,
+    ("get", "/selection"): SelectionBody,
+    ("put", "/selection"): SelectionBody,
+    ("get", "/clusters"): list[ClusterJson],
+    ("get", "/source/simulation"): SimulationJson,
+    ("get", "/localization"): LocalizationStateJson,
+    ("post", "/localization/reset"): LocalizationStateJson,
+    ("put", "/localization/map"): LocalizationStateJson,
+    ("get", "/pose"): WhereJson,
+    ("post", "/pose"): LocalizationStateJson,
+    ("get", "/trajectory"): TrajectoryJson,
+    ("post", "/odometry"): None,
 }
 
 
@@ -89,21 +110,28 @@ def test_every_answer_has_an_example_that_is_what_its_schema_says(document: Json
         validate(TypeAdapter(type_), example)
 
 
-# What the examples name and is not there: a sensor, a recording, a corner. And one recording at a time is recorded.
-IN_VAIN = {("/source", 404), ("/selection", 404), ("/recorder/start", 409)}
+# What the examples name and is not there: a sensor, a recording, a corner, a map.
+# Nothing is localized, and one recording at a time is recorded.
+IN_VAIN = {
+    ("/source", 404),
+    ("/selection", 404),
+    ("/recorder/start", 409),
+    ("/localization/map", 404),
+    ("/pose", 409),
+}
 
 
 def test_every_body_has_an_example_that_the_route_takes(server: Server, document: Json) -> None:
     answers = set()
     for (method, path), operation in operations(document).items():
-        for content in operation.get("requestBody", {}).get("content", {}).values():
-            if path == "/recordings/{name}":
+        for kind, content in operation.get("requestBody", {}).get("content", {}).items():
+            if kind != "application/json":
                 continue
             assert content["schema"]["examples"]
             for example in content["schema"]["examples"]:
                 here = example | {"port": "/dev/nothing"} if "port" in example else example
                 status = server.http.request(method, path, json=here).status_code
-                assert status in (200, 204) or (path, status) in IN_VAIN, (path, example)
+                assert status in (200, 201, 204) or (path, status) in IN_VAIN, (path, example)
                 answers.add((path, status))
     assert {("/source", 200), ("/emulator", 204), ("/recorder/start", 200)} < answers
 

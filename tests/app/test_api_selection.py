@@ -3,6 +3,8 @@ from pathlib import Path
 import pytest
 from serving import Json, Server, assert_problem, chosen
 
+NOTHING = {"corner": None, "landmark": None}
+
 
 def corner_ids(frame: Json) -> set[int]:
     return {corner["id"] for corner in frame["corners"]}
@@ -12,13 +14,13 @@ def test_a_selected_corner_is_marked_in_the_frames_and_told_to_all(server: Serve
     first = server.play(room)
     corner = first["corners"][2]["id"]
     with server.stream() as one, server.stream() as other:
-        assert server.change("PUT", "/selection", {"corner": corner}) == {"corner": corner}
+        assert server.change("PUT", "/selection", {"corner": corner}) == {"corner": corner, "landmark": None}
         for stream in (one, other):
             assert stream.state(lambda s: s["selection"]["corner"] == corner)
         frame = one.frame(lambda f: any(c["selected"] for c in f["corners"]))
     assert [c["id"] for c in frame["corners"] if c["selected"]] == [corner]
-    assert server.get("/selection") == {"corner": corner}
-    assert server.change("PUT", "/selection", {"corner": None}) == {"corner": None}
+    assert server.get("/selection") == {"corner": corner, "landmark": None}
+    assert server.change("PUT", "/selection", {"corner": None}) == NOTHING
 
 
 def test_while_paused_the_mark_appears_as_well(server: Server, room: Path) -> None:
@@ -62,4 +64,4 @@ def test_another_recording_has_other_corners_and_no_selection(server: Server, ro
 def test_what_is_no_corner_of_the_frame_is_not_selected(server: Server, body: Json, status: int) -> None:
     server.next_frame()
     assert_problem(server.http.put("/selection", json=body), status)
-    assert server.get("/selection") == {"corner": None}
+    assert server.get("/selection") == NOTHING

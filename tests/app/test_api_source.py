@@ -6,9 +6,9 @@ import pytest
 from mcap_ros2.writer import Writer
 from serving import Json, Server, Stream, assert_problem, chosen, write_room
 
-from app.frame import Taken
 from app.player import Player
 from app.sources import RecordingSource
+from app.taken import Taken
 
 LASER_SCAN = """std_msgs/Header header
 float32 angle_min
@@ -205,7 +205,8 @@ def test_a_file_that_breaks_off_plays_as_far_as_it_goes(server: Server, hokuyo: 
         ("PATCH", "/source", {"state": "ended"}),
         ("PATCH", "/source", {"index": 1.5}),
         ("PATCH", "/source", {"indx": 1}),
-        ("PUT", "/source", {"kind": "simulation"}),
+        ("PUT", "/source", {"kind": "simulation", "settings": {"world": "the moon"}}),
+        ("PUT", "/source", {"kind": "simulation", "settings": {"max_range": -1}}),
         ("PUT", "/source", {"kind": "device", "baud": 100}),
         ("PUT", "/source", {"kind": "device", "rpm": "fast"}),
         ("PUT", "/source", {"kind": "emulator", "port": "/dev/ttyUSB0"}),

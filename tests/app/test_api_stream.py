@@ -14,8 +14,8 @@ import websockets
 from serving import ROOT, Server, strict_json, write_room
 
 from app.runtime import Slot
-from app.serve import SEND_BUFFER
 from app.stream import Mailbox
+from app.transport import SEND_BUFFER
 
 RECEIVE_BUFFER = 8192
 
@@ -25,7 +25,7 @@ def test_first_comes_the_state_then_the_newest_frame(server: Server) -> None:
     with server.stream() as stream:
         state, frame = stream.message(), stream.message()
     assert state["type"] == "state"
-    assert state.keys() == {"type", "settings", "source", "selection", "recorder", "ready"}
+    assert state.keys() == {"type", "settings", "source", "selection", "localization", "recorder", "ready"}
     assert state["settings"] == server.get("/settings")
     assert state["source"].keys() == server.get("/source").keys()
     assert state["recorder"] == server.get("/recorder")

@@ -17,8 +17,8 @@ from serving import CORNERS, Json, Server
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-NODES = {"/grid", "/labels", "/points", "/segments", "/corners", "/sensor", "/selection"} | {
-    "/ellipses/fill", "/ellipses/outline", "/rejected/points", "/rejected/crosses",
+NODES = {"/grid", "/labels", "/body/points", "/body/segments", "/body/corners", "/body/sensor", "/body/selection"} | {
+    "/body/ellipses/fill", "/body/ellipses/outline", "/body/rejected/points", "/body/rejected/crosses",
 }  # fmt: skip
 
 
@@ -92,13 +92,13 @@ def test_a_client_gets_the_whole_scene_and_then_every_frame(server: Server, room
     with viewing(server) as viewer:
         viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
         assert viewer.nodes.keys() >= NODES
-        shown = viewer.array("/points", "points").reshape(-1, 3)
+        shown = viewer.array("/body/points", "points").reshape(-1, 3)
         np.testing.assert_allclose(shown[:, :2], points, atol=1e-4)
-        assert viewer.nodes["/points"]["precision"] == "float32"
-        discs = viewer.array("/corners", "batched_positions").reshape(-1, 3)[:, :2]
+        assert viewer.nodes["/body/points"]["precision"] == "float32"
+        discs = viewer.array("/body/corners", "batched_positions").reshape(-1, 3)[:, :2]
         assert np.linalg.norm(discs[:, None] - CORNERS, axis=2).min(axis=1).max() < 0.01
         server.change("POST", "/source/step", {"by": 1})
-        viewer.until(lambda: not np.array_equal(viewer.array("/points", "points").reshape(-1, 3), shown))
+        viewer.until(lambda: not np.array_equal(viewer.array("/body/points", "points").reshape(-1, 3), shown))
 
 
 def test_compare_mode_draws_every_method_in_its_colour(server: Server, room) -> None:
@@ -107,30 +107,32 @@ def test_compare_mode_draws_every_method_in_its_colour(server: Server, room) -> 
         server.play(room, paused=True)
         viewer.until(
             lambda: (
-                "/ellipses/fill" in viewer.nodes
-                and len(viewer.array("/ellipses/fill", "batched_positions")) == 36
+                "/body/ellipses/fill" in viewer.nodes
+                and len(viewer.array("/body/ellipses/fill", "batched_positions")) == 36
             )
         )
-        viewer.until(lambda: len(viewer.array("/ellipses/fill", "batched_colors", "u1")) == 36)
-        colours = viewer.array("/ellipses/fill", "batched_colors", "u1").reshape(-1, 3)
+        viewer.until(lambda: len(viewer.array("/body/ellipses/fill", "batched_colors", "u1")) == 36)
+        colours = viewer.array("/body/ellipses/fill", "batched_colors", "u1").reshape(-1, 3)
         assert len(np.unique(colours, axis=0)) == 3
-        viewer.until(lambda: len(viewer.array("/segments", "points")) == 12 * 6)
+        viewer.until(lambda: len(viewer.array("/body/segments", "points")) == 12 * 6)
 
 
 def test_layers_theme_and_selection_reach_the_scene(server: Server, room) -> None:
     frame = server.play(room, paused=True)
     with viewing(server) as viewer:
         viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
-        assert not viewer.nodes["/selection"]["visible"]
+        assert not viewer.nodes["/body/selection"]["visible"]
         server.change("PUT", "/selection", {"corner": frame["corners"][0]["id"]})
-        viewer.until(lambda: viewer.nodes["/selection"]["visible"])
-        ring = viewer.array("/selection", "points").reshape(-1, 3)[:, :2].mean(axis=0)
+        viewer.until(lambda: viewer.nodes["/body/selection"]["visible"])
+        ring = viewer.array("/body/selection", "points").reshape(-1, 3)[:, :2].mean(axis=0)
         corner = frame["corners"][0]["by_method"]["ml"]
         np.testing.assert_allclose(ring, [corner["x"], corner["y"]], atol=0.01)
         server.change(
             "PATCH", "/settings", {"view": {"layers": {"points": False, "grid": False}, "theme": "light"}}
         )
-        viewer.until(lambda: not (viewer.nodes["/points"]["visible"] or viewer.nodes["/grid"]["visible"]))
+        viewer.until(
+            lambda: not (viewer.nodes["/body/points"]["visible"] or viewer.nodes["/grid"]["visible"])
+        )
         assert "ThemeConfigurationMessage" in viewer.types
 
 
@@ -164,8 +166,8 @@ def look_from_above(viewer: Viewer) -> None:
 
 def click(viewer: Viewer, origin: tuple, direction: tuple) -> None:
     viewer.send(
-        type="SceneNodeClickMessage", name="/corners", instance_index=0, ray_origin=origin, ray_direction=direction,
-        screen_pos=(0.5, 0.5), modifier=None, owner="",
+        type="SceneNodeClickMessage", name="/body/corners", instance_index=0, ray_origin=origin,
+        ray_direction=direction, screen_pos=(0.5, 0.5), modifier=None, owner="",
     )  # fmt: skip
 
 

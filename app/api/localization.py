@@ -1,0 +1,190 @@
+"""Where the sensor is: pose, trajectory, initial pose, odometry from outside, the map to localize in."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from fastapi import APIRouter, Body, Query
+from pydantic import BaseModel, ConfigDict, Field
+from starlette.responses import Response
+from typing_extensions import TypedDict
+
+from app.api.dependencies import CurrentRuntime
+from app.api.examples import ok
+from app.located import pose_json
+from app.navigation import Navigation, NotNavigatingError
+from app.odometry_feed import OdometryPose
+from app.problems import ProblemError, documented, encode
+from app.runtime import Runtime
+from app.tables import csv_text
+from app.wire import LocalizationStateJson, Matrix3
+
+router = APIRouter(tags=["localization"], responses=documented(422))
+
+SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
+MOST_POSES = 10_000
+
+COVARIANCE = [[0.0004, 0.0, 0.0], [0.0, 0.0004, 0.0], [0.0, 0.0, 0.0001]]
+POSE = {
+    "stamp": 1795255000.1, "mode": "slam", "state": "tracking", "message": None, "x": 1.204, "y": -0.311,
+    "heading": 0.52, "covariance": COVARIANCE, "nis": 21.3, "dof": 24,
+}  # fmt: skip
+ROW = {
+    "stamp": 1795255000.1, "x": 1.204, "y": -0.311, "heading": 0.52,
+    "sigma_x": 0.004, "sigma_y": 0.005, "sigma_heading": 0.002,
+}  # fmt: skip
+STATE = {"mode": "slam", "session": 3, "map": None, "problem": None}
+ODOMETRY = {"stamp": 1795255000.1, "x": 1.2, "y": -0.3, "heading": 0.5}
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class WhereJson(TypedDict):
+    """T_world_sensor at `stamp` with its covariance (m², m rad, rad²), and what the filter thinks of itself."""
+
+    stamp: float
+    mode: Literal["localize", "slam"]
+    state: Literal["starting", "tracking", "coasting", "lost"]
+    message: str | None
+    x: float
+    y: float
+    heading: float
+    covariance: Matrix3
+    nis: float
+    dof: int
+
+
+class TrajectoryRowJson(TypedDict):
+    stamp: float
+    x: float
+    y: float
+    heading: float
+    sigma_x: float
+    sigma_y: float
+    sigma_heading: float
+
+
+class TrajectoryJson(TypedDict):
+    poses: list[TrajectoryRowJson]
+
+
+class _Body(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class InitialPose(_Body):
+    """T_world_sensor, with its covariance or the standard deviations of position and heading."""
+
+    x: Annotated[Finite, Field(description="m")]
+    y: Annotated[Finite, Field(description="m")]
+    heading: Annotated[Finite, Field(description="rad")]
+    covariance: Matrix3 | None = Field(None, description="of x, y, heading: m², m rad, rad²")
+    sigma_position: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False, description="m")] = (
+        SIGMA_POSITION
+    )
+    sigma_heading: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False, description="rad")] = (
+        SIGMA_HEADING
+    )
+
+
+class MapChoice(_Body):
+    """The session to localize in; null for the newest that has landmarks."""
+
+    session: int | None
+
+
+Since = Annotated[float | None, Query(allow_inf_nan=False, description="only poses after this stamp, s")]
+Limit = Annotated[int, Query(ge=1, le=MOST_POSES, description="at most so many, the newest")]
+Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with a header")]
+
+
+@router.get("/localization", responses=ok(STATE, "What is localized, and in which map"))
+def read(runtime: CurrentRuntime) -> LocalizationStateJson:
+    """Whether the pose is estimated, and in which map."""
+    return runtime.localization()
+
+
+@router.post("/localization/reset", responses=ok(STATE, "What is localized now"))
+def reset(runtime: CurrentRuntime) -> LocalizationStateJson:
+    """Begin again: SLAM with an empty map in a new session, localization from nothing."""
+    runtime.navigate(Navigation.reset)
+    return runtime.localization()
+
+
+@router.put("/localization/map", responses=ok(STATE, "What is localized in") | documented(404))
+def choose_map(
+    runtime: CurrentRuntime, choice: Annotated[MapChoice, Body(examples=[{"session": 3}])]
+) -> LocalizationStateJson:
+    """Choose the map to localize in; the mode stays what it is."""
+    runtime.navigate(lambda navigation: navigation.choose_map(choice.session))
+    return runtime.localization()
+
+
+@router.get("/pose", responses=ok(POSE, "The pose after the newest scan") | documented(404))
+def pose(runtime: CurrentRuntime) -> WhereJson:
+    """Where the sensor is."""
+    where = runtime.frame.where if runtime.frame else None
+    if where is None:
+        raise ProblemError(404, f"There is no pose: {_why(runtime)}")
+    found = where.whereabouts
+    return {
+        "stamp": found.stamp,
+        "mode": found.mode,
+        "state": found.state,
+        "message": found.message,
+        **pose_json(found.estimate.pose),
+        "covariance": found.estimate.covariance.tolist(),
+        "nis": found.nis,
+        "dof": found.dof,
+    }
+
+
+@router.post("/pose", responses=ok(STATE, "It is taken") | documented(409))
+def place(
+    runtime: CurrentRuntime,
+    pose: Annotated[InitialPose, Body(examples=[{"x": 1.0, "y": 0.5, "heading": 0.0}])],
+) -> LocalizationStateJson:
+    """Tell where the sensor is. 409 if nothing is localized."""
+    variances = [pose.sigma_position**2, pose.sigma_position**2, pose.sigma_heading**2]
+    covariance = np.diag(variances) if pose.covariance is None else np.array(pose.covariance)
+    try:
+        runtime.navigate(lambda navigation: navigation.place((pose.x, pose.y, pose.heading), covariance))
+    except NotNavigatingError as error:
+        raise ProblemError(409, str(error)) from error
+    return runtime.localization()
+
+
+def _trajectory_responses() -> dict[int | str, dict[str, Any]]:
+    responses = ok({"poses": [ROW]}, "The poses of this run, the oldest first")
+    responses[200]["content"]["text/csv"] = {"example": ",".join(ROW)}
+    return responses
+
+
+@router.get("/trajectory", response_model=TrajectoryJson, responses=_trajectory_responses())
+def trajectory(
+    runtime: CurrentRuntime, since: Since = None, limit: Limit = 1000, format: Format = "json"
+) -> Response:
+    """Where the sensor has been in this run, as the filter had it at each moment; empty if nothing is localized."""
+    rows = [row for row in runtime.navigation.trajectory if since is None or row[0] > since][-limit:]
+    if format == "csv":
+        return Response(
+            csv_text({name: [row[i] for row in rows] for i, name in enumerate(ROW)}), media_type="text/csv"
+        )
+    return encode({"poses": [dict(zip(ROW, row, strict=True)) for row in rows]})
+
+
+@router.post("/odometry", status_code=204)
+def odometry(
+    runtime: CurrentRuntime, poses: Annotated[OdometryPose | list[OdometryPose], Body(examples=[ODOMETRY])]
+) -> None:
+    """Feed T_odom_sensor, one pose or some in their order; stamps are Unix seconds, as those of the scans.
+
+    Refused, and left out, if the clock went back or the pose jumped: what came before it in a list is taken.
+    """
+    for pose in poses if isinstance(poses, list) else [poses]:
+        runtime.feed(pose)
+
+
+def _why(runtime: Runtime) -> str:
+    if runtime.settings.navigation.mode == "off":
+        return "nothing is localized; set navigation.mode to slam or localize."
+    return runtime.navigation.problem or "no scan has been processed yet."

@@ -1,0 +1,185 @@
+"""Where the sensor is, from scan to scan: the navigator of the current run, what feeds it and what it leaves behind."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from numpy.typing import ArrayLike
+
+from app.landmark_store import LandmarkRun, LandmarkStore
+from app.odometry_feed import OdometryFeed
+from app.settings import Settings
+from app.taken import Taken
+from app.trails import Paths, Row, Trails
+from lidarcore import Features, Scan
+from lidarcore.clusters import Clusters
+from lidarcore.errors import LocalizationError
+from lidarcore.localization import NavigationSettings, Navigator, Whereabouts
+from lidarcore.scan import Array
+
+REMEMBERED = 600  # scans whose whereabouts are shown again when they are
+
+NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
+
+
+class NotNavigatingError(LocalizationError):
+    """Nothing estimates a pose at the moment."""
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """What the navigator says after a scan.
+
+    stored  ids in the file of landmarks by their ids in `whereabouts`; in a known map they are the same
+    """
+
+    whereabouts: Whereabouts
+    session: int | None
+    stored: Mapping[int, int]
+    truth: Array | None
+    paths: Paths
+
+
+@dataclass(slots=True, eq=False)
+class Run:
+    """One estimate from its beginning on: another source, another mode or a reset begins another one.
+
+    written  where the map that is built goes; None in a known map, whose session is `known`
+    """
+
+    source: int
+    settings: NavigationSettings
+    navigator: Navigator
+    written: LandmarkRun | None
+    known: int | None
+    trails: Trails = field(default_factory=Trails)
+    shown: OrderedDict[int, Where] = field(default_factory=OrderedDict)
+    newest: int = -1
+
+    @property
+    def session(self) -> int | None:
+        """The session of the map that is built, once it has a landmark, or that is localized in."""
+        return self.written.session if self.written else self.known
+
+    def leads_to(self, taken: Taken, settings: NavigationSettings) -> bool:
+        """Whether the scan is the next of this run, or one that it has seen."""
+        index = taken.position["index"]
+        same = (self.source, self.settings) == (taken.source, settings)
+        return same and (index > self.newest or index in self.shown)
+
+    def step(
+        self, index: int, scan: Scan, features: Features, clusters: Clusters | None, method: str
+    ) -> Where:
+        """Go on by a scan; one that was seen already is shown as it was then."""
+        if index in self.shown:
+            return self.shown[index]
+        found = self.navigator.step(scan, features, clusters)
+        truth = self.trails.add(found, scan.truth)
+        if self.written:
+            self.written.put(found.landmarks, method)
+        ids = found.landmarks.ids.tolist()
+        stored = self.written.writer.ids if self.written else dict(zip(ids, ids, strict=True))
+        where = Where(found, self.session, stored, truth, self.trails.paths())
+        self.newest = max(self.newest, index)
+        self.shown[index] = where
+        if len(self.shown) > REMEMBERED:
+            self.shown.popitem(last=False)
+        return where
+
+
+class Navigation:
+    """Feeds the navigator with scans from the worker's thread; the rest may be called from any thread."""
+
+    def __init__(self, store: LandmarkStore) -> None:
+        self.odometry = OdometryFeed()
+        self.problem: str | None = None
+        self._store = store
+        self._map: int | None = None
+        self._run: Run | None = None
+        self._lock = threading.RLock()
+
+    @property
+    def session(self) -> int | None:
+        """The session of the map that is built, or localized in."""
+        run = self._run
+        return run.session if run else None
+
+    @property
+    def map(self) -> int | None:
+        """The session chosen to localize in; None for the newest with landmarks."""
+        return self._map
+
+    @property
+    def trajectory(self) -> list[Row]:
+        """All poses of this run that are kept."""
+        with self._lock:
+            return list(self._run.trails.trajectory) if self._run else []
+
+    def choose_map(self, session: int | None) -> None:
+        """Localize in the landmarks of that session. Raises UnknownSessionError."""
+        if session is not None:
+            self._store.landmarks(session)
+        with self._lock:
+            self._map = session
+            if self._run and self._run.known is not None:
+                self._run = None
+
+    def reset(self) -> None:
+        """Begin again: SLAM with an empty map, localization from nothing."""
+        with self._lock:
+            self._run = None
+            self.odometry.clear()
+
+    def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
+        """The sensor is here, says someone: (3,) m, m, rad and (3, 3). Raises LocalizationError."""
+        with self._lock:
+            if self._run is None:
+                raise NotNavigatingError(
+                    self.problem or "Nothing is localized: set navigation.mode to slam or localize."
+                )
+            self._run.navigator.place(pose, covariance)
+
+    def deskewed(self, taken: Taken, settings: Settings) -> Scan:
+        """The scan as if the sensor had stood, as far as its motion is known, with the odometry there is."""
+        with self._lock:
+            run = self._of(taken, settings.navigation)
+            return run.navigator.deskewed(self._with_odometry(taken.scan)) if run else taken.scan
+
+    def step(
+        self, taken: Taken, scan: Scan, features: Features, clusters: Clusters | None, method: str
+    ) -> Where | None:
+        """Go on by a scan that `deskewed` gave; `method` is what found the landmarks in it."""
+        with self._lock:
+            run = self._run
+            return run.step(taken.position["index"], scan, features, clusters, method) if run else None
+
+    def _with_odometry(self, scan: Scan) -> Scan:
+        """With what another program says of the moment, unless the source has odometry itself."""
+        if scan.odometry is not None or (pose := self.odometry.at(scan.stamp)) is None:
+            return scan
+        return replace(scan, odometry=pose)
+
+    def _of(self, taken: Taken, wanted: NavigationSettings) -> Run | None:
+        """The run that this scan belongs to; a new one where the old one does not lead to it."""
+        run = self._run
+        if run and run.leads_to(taken, wanted):
+            return run
+        self._run = self.problem = None
+        if wanted.mode == "slam":
+            written = self._store.begin(taken.name)
+            self._run = Run(taken.source, wanted, Navigator(wanted), written, None)
+        elif wanted.mode == "localize":
+            self._run = self._localizing(taken, wanted)
+        else:
+            self._store.use(None)
+        return self._run
+
+    def _localizing(self, taken: Taken, wanted: NavigationSettings) -> Run | None:
+        session = self._map if self._map is not None else self._store.newest()
+        self._store.use(session)
+        known = None if session is None else self._store.landmarks(session)
+        if not known:
+            self.problem = NO_MAP
+            return None
+        return Run(taken.source, wanted, Navigator(wanted, known), None, session)

@@ -1,0 +1,151 @@
+"""Pose, trajectory, initial pose and odometry from outside, on a real server that plays a simulated robot."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from serving import Json, Server, assert_problem, chosen
+
+SLAM = {"navigation": {"mode": "slam"}}
+
+
+@pytest.fixture(scope="module")
+def driving(tmp_path_factory: pytest.TempPathFactory, background: Path) -> Iterator[Server]:
+    """A server that maps two rooms through which a robot drives."""
+    server = Server(tmp_path_factory.mktemp("driving") / "recordings", recording=background)
+    server.change("PATCH", "/settings", SLAM)
+    server.change("PUT", "/source", {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}})
+    yield server
+    server.stop()
+
+
+def located(server: Server, holds: Any = bool) -> Json:
+    """A frame of the simulation that has what is asked of its localization."""
+    with server.stream() as stream:
+        return stream.frame(
+            lambda f: f["source"]["kind"] == "simulation" and f["localization"] and holds(f["localization"])
+        )
+
+
+def test_the_pose_follows_the_robot_and_says_how_well_it_is_known(driving: Server) -> None:
+    frame = located(driving, lambda where: where["state"] == "tracking")
+    where = frame["localization"]
+    pose = driving.get("/pose")
+    assert pose["mode"] == "slam"
+    assert pose["stamp"] >= frame["stamp"]
+    assert np.linalg.eigvalsh(pose["covariance"]).min() > 0
+    assert where["truth"] is not None
+    low, high = where["nis_band"]
+    assert 0 < low < where["dof"] < high
+    assert len(where["innovations"]) == where["dof"] / 2
+    assert sum(i["squared_distance"] >= 0 for i in where["innovations"]) == len(where["innovations"])
+
+
+def test_the_trajectory_grows_and_can_be_asked_for_from_a_stamp_on(driving: Server) -> None:
+    located(driving, lambda where: where["state"] == "tracking")
+    poses = driving.get("/trajectory", limit=10_000)["poses"]
+    stamps = [pose["stamp"] for pose in poses]
+    assert stamps == sorted(stamps)
+    assert [p["stamp"] for p in driving.get("/trajectory", since=stamps[-3], limit=2)["poses"]] != stamps[:2]
+    assert all(p["stamp"] > stamps[-3] for p in driving.get("/trajectory", since=stamps[-3])["poses"])
+    table = driving.http.get("/trajectory", params={"format": "csv", "limit": 5}).text.splitlines()
+    assert table[0] == "stamp,x,y,heading,sigma_x,sigma_y,sigma_heading"
+    assert len(table) == 6
+
+
+def test_a_reset_begins_another_map_at_the_origin(driving: Server) -> None:
+    before = located(driving, lambda where: where["session"] is not None)["localization"]
+    driving.change("POST", "/localization/reset", None)
+    after = located(driving, lambda where: where["session"] not in (None, before["session"]))["localization"]
+    assert after["session"] > before["session"]
+    first = driving.get("/trajectory", limit=10_000)["poses"][0]
+    assert (first["x"], first["y"], first["heading"]) == pytest.approx((0, 0, 0), abs=1e-6)
+
+
+def test_a_pose_given_by_hand_is_where_the_trajectory_goes_on(driving: Server) -> None:
+    stamp = located(driving)["stamp"]
+    driving.change("POST", "/localization/reset", None)
+    placed = {"x": 500.0, "y": -300.0, "heading": 1.0, "sigma_position": 0.01, "sigma_heading": 0.01}
+    located(driving, lambda where: abs(where["pose"]["x"]) < 100)
+    driving.change("POST", "/pose", placed)
+    located(driving, lambda where: where["pose"]["x"] > 400)
+    poses = driving.get("/trajectory", since=stamp, limit=10_000)["poses"]
+    after = next(pose for pose in poses if pose["x"] > 400)
+    assert np.hypot(after["x"] - 500, after["y"] + 300) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("body", "pointer"),
+    [
+        ({"x": "far", "y": 0, "heading": 0}, "/x"),
+        ({"x": 0, "y": 0}, "/heading"),
+        ({"x": 0, "y": 0, "heading": 0, "sigma_heading": 0}, "/sigma_heading"),
+        ({"x": 0, "y": 0, "heading": 0, "z": 0}, "/z"),
+    ],
+)
+def test_a_pose_that_is_none_is_refused(driving: Server, body: Json, pointer: str) -> None:
+    answer = driving.http.post("/pose", json=body)
+    assert_problem(answer, 422)
+    assert pointer in [error["pointer"] for error in answer.json()["errors"]]
+
+
+@pytest.mark.parametrize("path", ["/pose", "/odometry"])
+def test_nan_is_refused(driving: Server, path: str) -> None:
+    stamp = '"stamp": 1, ' if path == "/odometry" else ""
+    body = f'{{{stamp}"x": NaN, "y": 0, "heading": 0}}'
+    assert_problem(driving.http.post(path, content=body, headers={"Content-Type": "application/json"}), 422)
+
+
+def test_a_covariance_that_is_none_is_refused_and_the_pose_stays(driving: Server) -> None:
+    located(driving)
+    before = driving.get("/pose")
+    singular = [[1, 1, 0], [1, 1, 0], [0, 0, 1]]
+    answer = driving.http.post("/pose", json={"x": 99, "y": 99, "heading": 0, "covariance": singular})
+    assert_problem(answer, 422)
+    assert "covariance" in answer.json()["detail"]
+    after = driving.get("/pose")
+    assert np.hypot(after["x"] - before["x"], after["y"] - before["y"]) < 2
+
+
+def test_without_localization_there_is_no_pose_and_none_can_be_set(shared_server: Server) -> None:
+    assert_problem(shared_server.http.get("/pose"), 404)
+    assert_problem(shared_server.http.post("/pose", json={"x": 0, "y": 0, "heading": 0}), 409)
+    assert shared_server.get("/trajectory") == {"poses": []}
+    assert shared_server.get("/localization")["mode"] == "off"
+
+
+def test_localizing_without_a_map_says_what_is_missing(server: Server) -> None:
+    server.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
+    server.next_frame()
+    assert "no map" in server.get("/localization")["problem"]
+    assert_problem(server.http.put("/localization/map", json={"session": 12345}), 404)
+
+
+def test_odometry_that_jumps_or_goes_back_is_refused_and_what_follows_is_taken(shared_server: Server) -> None:
+    def send(stamp: float, x: float) -> Any:
+        return shared_server.http.post("/odometry", json={"stamp": stamp, "x": x, "y": 0, "heading": 0})
+
+    assert send(100.0, 0.0).status_code == 204
+    assert send(100.1, 0.05).status_code == 204
+    jump = send(100.2, 300.0)
+    assert_problem(jump, 422)
+    assert "jumped" in jump.json()["detail"]
+    assert send(100.3, 300.05).status_code == 204
+    assert_problem(send(99.0, 300.1), 422)
+    assert send(99.1, 300.15).status_code == 204
+
+
+def test_odometry_over_the_websocket_is_what_dead_reckoning_goes_by(server: Server, room: Path) -> None:
+    with server.stream() as stream:
+        for stamp in np.arange(99.0, 104.0, 0.1):
+            pose = {"x": round(0.5 * (stamp - 99), 6), "y": 0.0, "heading": 0.0}
+            stream.websocket.send(json.dumps({"type": "odometry", "stamp": stamp, **pose}))
+        stream.websocket.send("nonsense")
+        assert "JSON" in stream.until("error", bool)["detail"]
+        server.change("PATCH", "/settings", SLAM)
+        server.change("PUT", "/source", {"kind": "recording", "name": room.name})
+        last = stream.frame(lambda frame: chosen(frame) and frame["source"]["index"] == 29)
+    assert last["localization"]["dead_reckoned"]["x"] == pytest.approx(0.5 * 2.9, abs=1e-6)

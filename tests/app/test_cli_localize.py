@@ -1,0 +1,71 @@
+"""`lidarcore localize` as a process, on a recording of a simulated robot whose true poses are known."""
+
+import csv
+import json
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from processes import assert_refused, run
+
+from lidarcore import Scan
+from lidarcore.poses import compose, inverse
+from lidarcore.recordings.writer import RecordingWriter
+from lidarcore.simulation.robot import SimulatedRobot
+from lidarcore.simulation.settings import SimulationSettings
+
+NOISE = ("--set", "noise.sigma_range=0.01", "--set", "noise.sigma_bearing=0.001")
+
+
+@pytest.fixture(scope="module")
+def scans() -> list[Scan]:
+    return list(islice(SimulatedRobot(SimulationSettings(world="two rooms", seed=5), begin=1e9), 120))
+
+
+@pytest.fixture(scope="module")
+def recording(scans: list[Scan], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("driven") / "driven.mcap"
+    with RecordingWriter(path) as writer:
+        for scan in scans:
+            writer.write(scan)
+    return path
+
+
+def poses_of(path: Path) -> np.ndarray:
+    with path.open(newline="") as file:
+        return np.array(
+            [[float(row[name]) for name in ("x", "y", "heading")] for row in csv.DictReader(file)]
+        )
+
+
+def test_a_map_that_slam_saved_is_one_to_localize_in(
+    scans: list[Scan], recording: Path, tmp_path: Path
+) -> None:
+    built, poses, again = tmp_path / "map.json", tmp_path / "slam.csv", tmp_path / "localized.csv"
+    first = run("localize", recording, "-o", poses, "--save-map", built, *NOISE)
+    assert first.returncode == 0, first.stderr
+    assert "120 scans" in first.stdout
+    assert len(json.loads(built.read_text())["landmarks"]) >= 4
+    second = run("localize", recording, "-o", again, "--map", built, *NOISE)
+    assert second.returncode == 0, second.stderr
+    start = compose(poses_of(poses)[0], inverse(scans[0].truth))
+    true = np.array([compose(start, scan.truth) for scan in scans])
+    errors = [np.linalg.norm(poses_of(path)[:, :2] - true[:, :2], axis=1) for path in (poses, again)]
+    travelled = np.linalg.norm(np.diff(true[:, :2], axis=0), axis=1).sum()
+    assert travelled > 4
+    assert errors[0].max() < 0.25
+    assert np.median(errors[1]) < 0.25
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("--map", "nowhere.json"), "nowhere.json"),
+        (("--save-map", "map.txt"), "should end in one of"),
+    ],
+)
+def test_what_cannot_be_is_said_in_a_sentence(
+    recording: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    assert_refused(run("localize", recording, *arguments), words)
