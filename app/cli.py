@@ -11,6 +11,7 @@ import typer
 
 from app.cli_devices import devices
 from app.cli_emulate import PASS_ON, emulate
+from app.cli_evaluate import evaluate
 from app.cli_experiment import experiment
 from app.cli_localize import localize
 from app.cli_options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
@@ -140,6 +141,7 @@ cli.command()(devices)
 cli.command()(record)
 cli.command()(localize)
 cli.add_typer(experiment, name="experiment")
+cli.add_typer(evaluate, name="evaluate")
 cli.command(add_help_option=False, context_settings=PASS_ON)(emulate)
 
 

@@ -15,6 +15,7 @@ from app.selection import Selection
 from app.settings import Settings
 from app.taken import Taken
 from app.tracking import CornerRow
+from app.trails import NO_PATHS, Paths
 from app.wire import (
     CornerJson,
     FrameJson,
@@ -46,6 +47,7 @@ class Frame:
     method_us: Mapping[str, float]
     clusters: Clusters | None = None
     where: Where | None = None
+    paths: Paths = NO_PATHS
     cluster_us: float = 0.0
     locate_us: float = 0.0
     draw_us: float = 0.0

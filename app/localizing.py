@@ -13,10 +13,12 @@ from app.tables import csv_text
 from lidarcore import RecordingError, Scan, extract
 from lidarcore.clusters import cluster
 from lidarcore.landmarks import FORMATS, read_landmarks, write_landmarks
-from lidarcore.localization import Landmarks, Navigator, Whereabouts, from_stored, to_stored
+from lidarcore.localization import Landmarks, Navigator, Points, Whereabouts, from_stored, to_stored
 from lidarcore.recordings import Recording
 from lidarcore.scan import Array
+from lidarcore.scanmatching import MatchSettings, ScanSlam, ScanSlamSettings
 
+NO_LANDMARKS = Landmarks.of(Points(np.empty((0, 2)), np.eye(2)))
 COLUMNS = (
     "stamp", "state", "x", "y", "heading", "var_x", "cov_xy", "cov_x_heading", "var_y", "cov_y_heading", "var_heading",
     "matched", "nis", "dof",
@@ -48,6 +50,21 @@ def localize(
         tracked += found.state == "tracking"
         progress(number)
     return Outcome(columns, len(columns["stamp"]), tracked, navigator.landmarks)
+
+
+def match_scans(recording: Recording, settings: Settings, progress: Callable[[int], None]) -> Outcome:
+    """Place every scan on those before it, without landmarks; the poses are as all scans together have them."""
+    slam = ScanSlam(ScanSlamSettings(match=MatchSettings(noise=settings.extraction.noise)))
+    states: list[object] = []
+    for number, scan in enumerate(recording, 1):
+        states.append("tracking" if slam.step(scan).connected else "lost")
+        progress(number)
+    stamps, poses = slam.trajectory()
+    rows = (_uncertain(*row) for row in zip(poses, slam.covariances(), strict=True))
+    columns: list[list[object]] = [stamps.tolist(), states, *map(list, zip(*rows, strict=True))]
+    return Outcome(
+        dict(zip(COLUMNS, columns, strict=False)), len(states), states.count("tracking"), NO_LANDMARKS
+    )
 
 
 def read_map(path: Path) -> Landmarks:
@@ -85,6 +102,10 @@ def _step(navigator: Navigator, scan: Scan, settings: Settings) -> Whereabouts:
 
 
 def _row(found: Whereabouts) -> tuple[object, ...]:
-    pose: Array = found.estimate.pose
-    upper: Array = found.estimate.covariance[np.triu_indices(3)]
-    return (found.stamp, found.state, *pose.tolist(), *upper.tolist(), len(found.pairs), found.nis, found.dof)
+    estimate = found.estimate
+    where = _uncertain(estimate.pose, estimate.covariance)
+    return (found.stamp, found.state, *where, len(found.pairs), found.nis, found.dof)
+
+
+def _uncertain(pose: Array, covariance: Array) -> tuple[float, ...]:
+    return (*pose.tolist(), *covariance[np.triu_indices(3)].tolist())

@@ -11,7 +11,7 @@ from app.landmark_store import LandmarkRun, LandmarkStore
 from app.odometry_feed import OdometryFeed
 from app.settings import Settings
 from app.taken import Taken
-from app.trails import Paths, Row, Trails
+from app.trails import NO_PATHS, Paths, Row, Trails
 from lidarcore import Features, Scan
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError
@@ -38,7 +38,6 @@ class Where:
     session: int | None
     stored: Mapping[int, int]
     truth: Array | None
-    paths: Paths
 
 
 @dataclass(slots=True, eq=False)
@@ -80,7 +79,7 @@ class Run:
             self.written.put(found.landmarks, method)
         ids = found.landmarks.ids.tolist()
         stored = self.written.writer.ids if self.written else dict(zip(ids, ids, strict=True))
-        where = Where(found, self.session, stored, truth, self.trails.paths())
+        where = Where(found, self.session, stored, truth)
         self.newest = max(self.newest, index)
         self.shown[index] = where
         if len(self.shown) > REMEMBERED:
@@ -115,6 +114,12 @@ class Navigation:
         """All poses of this run that are kept."""
         with self._lock:
             return list(self._run.trails.trajectory) if self._run else []
+
+    @property
+    def paths(self) -> Paths:
+        """Where the sensor has been in this run."""
+        run = self._run
+        return run.trails.paths() if run else NO_PATHS
 
     def choose_map(self, session: int | None) -> None:
         """Localize in the landmarks of that session. Raises UnknownSessionError."""

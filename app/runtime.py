@@ -206,6 +206,7 @@ class Runtime:
             method_us=method_us,
             clusters=clusters,
             where=where,
+            paths=self.navigation.paths,
             cluster_us=1e6 * (clustered - begin),
             locate_us=1e6 * (located - clustered),
             rate_hz=self._rate(),

@@ -19,7 +19,6 @@ FADED = 60.0  # s after which a landmark that is not seen looks its palest
 PALEST = 0.45
 AT_ORIGIN = np.zeros(3)
 NOTHING = np.empty((0, 2, 2))
-NO_PATHS = Paths(*(np.empty((0, 2)) for _ in range(3)))
 
 
 class MapLayers:
@@ -35,7 +34,7 @@ class MapLayers:
         self._canvas.place(pose_of(frame))
         layers, scale = frame.settings.view.layers, frame.settings.view.ellipse_scale
         self._draw_pose(frame.where, layers, scale)
-        self._draw_trails(frame.where, layers)
+        self._draw_trails(frame.paths, layers)
         self._draw_associations(frame.where, layers)
         self._draw_landmarks(frame, reach)
 
@@ -48,8 +47,7 @@ class MapLayers:
             strokes = polylines(outline)
         self._canvas.strokes("pose", layers.pose, strokes, self._ink("trail"))
 
-    def _draw_trails(self, where: Where | None, layers: Layers) -> None:
-        paths = NO_PATHS if where is None else where.paths
+    def _draw_trails(self, paths: Paths, layers: Layers) -> None:
         for name, visible, points in (
             ("trail", layers.trail, paths.estimated),
             ("reckoned", layers.dead_reckoned, paths.dead_reckoned),

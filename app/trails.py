@@ -41,6 +41,9 @@ class Paths:
     true: Array
 
 
+NO_PATHS = Paths(*(np.empty((0, 2)) for _ in range(3)))
+
+
 class Trails:
     """The ways of one run, and its trajectory."""
 

@@ -98,6 +98,10 @@ class ScanSlam:
         stamps = np.array([tie.stamp for tie in self._ties], np.float64)
         return stamps, np.array([compose(poses[tie.node], tie.known[0]) for tie in self._ties]).reshape(-1, 3)
 
+    def covariances(self) -> Array:
+        """(T, 3, 3) of the poses that `trajectory` gives."""
+        return np.array([self._uncertain(tie)[1] for tie in self._ties]).reshape(-1, 3, 3)
+
     def _since(self, scan: Scan) -> float:
         dt = scan.stamp - self._ties[-1].stamp
         if dt < 0:
@@ -147,5 +151,8 @@ class ScanSlam:
 
     def _placement(self, connected: bool, loops: int) -> Placement:
         tie = self._ties[-1]
-        pose, P = chain((self.graph.poses[tie.node], self.graph.covariance(tie.node)), tie.known)
-        return Placement(tie.stamp, pose, P, tie.node, connected, loops)
+        return Placement(tie.stamp, *self._uncertain(tie), tie.node, connected, loops)
+
+    def _uncertain(self, tie: _Tie) -> Uncertain:
+        """T_world_scan with its covariance."""
+        return chain((self.graph.poses[tie.node], self.graph.covariance(tie.node)), tie.known)

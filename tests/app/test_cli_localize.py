@@ -58,6 +58,17 @@ def test_a_map_that_slam_saved_is_one_to_localize_in(
     assert np.median(errors[1]) < 0.25
 
 
+def test_whole_scans_are_matched_without_landmarks(
+    scans: list[Scan], recording: Path, tmp_path: Path
+) -> None:
+    poses = tmp_path / "poses.csv"
+    result = run("localize", recording, "--scans", "-o", poses, *NOISE)
+    assert result.returncode == 0, result.stderr
+    assert "120 of them tracked" in result.stdout
+    true = np.array([compose(inverse(scans[0].truth), scan.truth) for scan in scans])
+    assert np.linalg.norm(poses_of(poses)[:, :2] - true[:, :2], axis=1).max() < 0.1
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
