@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from app.load import Load, measure_load
+from app.map_load import LIMIT_MS, measure_map_queries
 from lidarcore.evaluation.accuracy import measure_accuracy
 from lidarcore.evaluation.filter_speed import time_localizer, time_slam
 from lidarcore.evaluation.speed import Timing, time_decoding, time_extraction, time_fits, time_growth
@@ -18,11 +19,12 @@ SCANS, SEED = 400, 2026
 ACCURACY = {0.01: (0.995, 0.999), 0.02: (0.99, 0.99), 0.03: (0.99, 0.985), 0.05: (0.99, 0.97)}
 CORNER_RECALL, CORNER_RMS = 0.985, {0.01: 0.009}
 LOAD_SECONDS = 15.0
+LANDMARKS, QUESTIONS = 1_000_000, 400
 SLAM_MS = {100: 0.3, 1_000: 5.0, 3_000: None}  # landmarks: at most so long a scan
 
 
 def run() -> None:
-    """Measure and print everything; takes about two minutes."""
+    """Measure and print everything; takes about five minutes."""
     console = Console()
     warm_up()
     console.print(f"{_processor()}, Python {platform.python_version()}, numpy {np.__version__}\n")
@@ -43,6 +45,7 @@ def run() -> None:
     console.print(_slam())
     console.print(_accuracy())
     console.print(_load())
+    console.print(_queries())
 
 
 def _processor() -> str:
@@ -103,7 +106,7 @@ def _accuracy() -> Table:
 
 def _load() -> Table:
     table = _table(
-        f"Server with an emulated sensor at 10 Hz, all layers on, {LOAD_SECONDS:.0f} s",
+        f"Server with an emulated sensor at 10 Hz, SLAM and all layers on, {LOAD_SECONDS:.0f} s",
         "browsers", "CPU % of a core", "frames/s", "age ms p50", "age ms p99", "frames behind", "memory",
     )  # fmt: skip
     for clients, most in ((1, 15.0), (20, None)):
@@ -117,6 +120,23 @@ def _load() -> Table:
             _age(load, 99, 20.0),
             _judged(str(load.lag), load.lag <= 1),
             f"{load.memory_growth / 1e6:+.1f} MB",
+        )
+    return table
+
+
+def _queries() -> Table:
+    table = _table(
+        f"A map of {LANDMARKS:,} landmarks asked over HTTP, while a live run writes",
+        "question", "median ms", "p99 ms", "kB", "GET /version: median ms", "p99 ms",
+    )  # fmt: skip
+    for row in measure_map_queries(LANDMARKS, QUESTIONS):
+        table.add_row(
+            row.what,
+            f"{row.median:.2f}",
+            _judged(f"{row.p99:.2f}", row.p99 <= LIMIT_MS),
+            f"{row.kilobytes:.1f}",
+            f"{row.yardstick_median:.2f}",
+            f"{row.yardstick_p99:.2f}",
         )
     return table
 

@@ -38,7 +38,7 @@ def _table(title: str, rows: Iterable[Row]) -> Table:
     for heading in ("fitter", "covariance"):
         table.add_column(heading, no_wrap=True)
     for heading, _, _ in COLUMNS.values():
-        table.add_column(heading, justify="right", no_wrap=True)
+        table.add_column(heading, justify="right")
     for row in rows:
         cells = [_cell(row.figures[name], factor, digits) for name, (_, factor, digits) in COLUMNS.items()]
         believed = HONEST[0] <= row.figures["coverage_95"].value <= HONEST[1]

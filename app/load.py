@@ -14,7 +14,9 @@ import psutil
 from websockets.asyncio.client import connect
 
 SETTLE = 3.0  # s before measuring
-ALL_LAYERS = ("--set", "view.layers.rejected=true")  # the one that is off by default
+EVERYTHING = (  # what is off by default
+    "--set", "view.layers.rejected=true", "--set", "view.layers.clusters=true", "--set", "navigation.mode=slam",
+)  # fmt: skip
 
 
 @dataclass(slots=True)
@@ -31,7 +33,7 @@ class Load:
 
 def measure_load(clients: int, seconds: float) -> Load:
     """Serve an emulated sensor to this many browsers: each a stream of frames and a scene."""
-    with server(*ALL_LAYERS) as (process, port):
+    with server(*EVERYTHING) as (process, port):
         return asyncio.run(_measure(process, port, clients, seconds))
 
 

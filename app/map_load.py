@@ -1,6 +1,5 @@
-"""How fast a running server answers about a large map while its live run writes: `python -m app.map_load`."""
+"""How fast a running server answers about a large map while its live run writes."""
 
-import argparse
 import json
 import tempfile
 import time
@@ -13,7 +12,7 @@ from urllib.parse import urlencode
 import numpy as np
 
 from app.load import SETTLE, server
-from lidarcore.evaluation.landmark_speed import DENSITY, LIMIT_MS, random_landmarks
+from lidarcore.evaluation.landmark_speed import DENSITY, random_landmarks
 from lidarcore.landmarks import Atlas
 from lidarcore.scan import Array
 
@@ -112,19 +111,3 @@ def _wait_for_landmarks(port: int) -> None:
         time.sleep(0.2)
     connection.close()
     time.sleep(SETTLE)
-
-
-def main() -> None:
-    """Print the latencies with a million landmarks, which take about a minute and a half to make."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--landmarks", type=int, default=1_000_000)
-    parser.add_argument("--questions", type=int, default=1000)
-    options = parser.parse_args()
-    for row in measure_map_queries(options.landmarks, options.questions):
-        judged = "ok" if row.p99 <= LIMIT_MS else "missed"
-        print(f"{row.what:38} median {row.median:6.2f} ms, p99 {row.p99:6.2f} ms ({judged}), {row.kilobytes:6.1f} kB; "
-              f"yardstick median {row.yardstick_median:.2f} ms, p99 {row.yardstick_p99:.2f} ms")  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()

@@ -16,6 +16,7 @@ from prometheus_client.registry import Collector
 from starlette.responses import Response
 
 from app.frame import Frame
+from app.navigation import Where
 from app.recorder import AsyncRecorder
 from app.runtime import Runtime
 from app.stream import Hub
@@ -36,6 +37,7 @@ class Metrics(Collector):
             "latency", "from the last byte of a revolution to a browser's socket", LATENCY
         )
         self._extraction = self._histogram("extraction", "segments and corners by every method shown", WORK)
+        self._location = self._histogram("location", "the pose and the map", WORK)
         self._drawing = self._histogram("drawing", "the scene", WORK)
 
     def watch(self, runtime: Runtime, hub: Hub, recorder: AsyncRecorder) -> None:
@@ -61,6 +63,8 @@ class Metrics(Collector):
         yield _gauge("recording", "1 while recording", status["state"] == "recording")
         yield _gauge("recording_bytes", "size of the recording", status["size"])
         yield _gauge("recording_dropped", "scans and reads that the recording lacks", status["dropped"])
+        if frame and frame.where:
+            yield from _localization(frame.where)
         if device := self._runtime.player.source.device():
             yield from _device(device)
 
@@ -71,11 +75,21 @@ class Metrics(Collector):
     def _made(self, frame: Frame) -> None:
         self._extraction.observe(1e-6 * frame.extract_us)
         self._drawing.observe(1e-6 * frame.draw_us)
+        if frame.where:
+            self._location.observe(1e-6 * frame.locate_us)
 
     def _histogram(self, name: str, about: str, buckets: tuple[float, ...]) -> Histogram:
         return Histogram(
             f"lidarcore_{name}_seconds", f"Time: {about}", buckets=buckets, registry=self.registry
         )
+
+
+def _localization(where: Where) -> Iterator[Metric]:
+    found = where.whereabouts
+    yield _gauge("tracking", "1 while the pose is known", found.state == "tracking")
+    yield _gauge("landmarks", "confirmed ones of the map", found.landmarks.confirmed.sum())
+    yield _gauge("matched", "landmarks recognised in the newest scan", len(found.pairs))
+    yield _gauge("nis", "normalised innovation squared of the newest scan", found.nis)
 
 
 def _device(device: DeviceJson) -> Iterator[Metric]:
