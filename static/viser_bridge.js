@@ -1,17 +1,26 @@
 // Runs in viser's page before viser does: turns its 3D view into a map seen from above, inside our page.
-// The parent uses window.lidarView; keys go to the parent, so that its shortcuts work wherever the focus is.
+// The parent uses window.lidarView; it is sent the keys, so that its shortcuts work wherever the focus is, and the
+// pose that someone drags: {type: "pose", x, y, heading} in the world, m and rad.
 
 (() => {
   "use strict";
   const NORTH_UP = Math.PI / 2; // azimuth at which y points up on the screen
-  const MARGIN = 1.08;
+  const MARGIN = 1.08; // around the room when it is looked at,
+  const EDGE = 1.02; // and what has to be left of it
   const SMALL = 0.6; // of the view: a room that fills less than this is looked at again
   const FOLLOW_MS = 1000;
+  const SHORT_DRAG = 12; // px; shorter ones have no direction
+  const AT_ORIGIN = { x: 0, y: 0, heading: 0 };
   // viser's own panel and notices have no place here: the page around this one has its own.
-  const STYLE = "[data-floating-window], .mantine-Notifications-root, .mantine-Paper-root { display: none !important }";
+  const STYLE = `
+    [data-floating-window], .mantine-Notifications-root, .mantine-Paper-root { display: none !important }
+    .pose-catcher { position: fixed; inset: 0; z-index: 1000; cursor: crosshair; touch-action: none }
+    .pose-catcher svg { width: 100%; height: 100%; fill: none; stroke: #ffe14d; stroke-width: 3 }
+    .pose-catcher .halo { stroke: #14171a; stroke-width: 6 }`;
 
   let rotating = false;
   let moved = false; // by the user, since the last fit
+  let placing = null; // what takes the drag of a pose
 
   // viser only reconnects while its window has the focus, which a frame or a wall display rarely has.
   document.hasFocus = () => !document.hidden;
@@ -57,16 +66,28 @@
 
   /** Until the user moves the view, keep the room in it. */
   async function follow() {
-    const room = moved || rotating || document.hidden ? null : await measure();
+    const room = moved || rotating || placing || document.hidden ? null : await measure();
     if (room && !isInView(room)) lookDownOn(room);
   }
 
-  /** Centre and half width of the newest scan along x and y; null while there is none. */
+  /** Centre and half width of the newest scan along x and y of the world; null while there is none. */
   async function measure() {
     await ready;
     const health = await ask("health");
     const frame = health?.ready ? await ask("frame?points=true") : null;
-    return frame && [0, 1].map((axis) => span(frame.points.map((point) => point[axis])));
+    if (!frame) return null;
+    const { x, y, heading } = frame.localization?.pose ?? AT_ORIGIN;
+    const [cos, sin] = [Math.cos(heading), Math.sin(heading)];
+    const placed = frame.points.map(([ahead, left]) => [
+      x + cos * ahead - sin * left,
+      y + sin * ahead + cos * left,
+    ]);
+    return [x, y].map((sensor, axis) =>
+      span(
+        placed.map((point) => point[axis]),
+        sensor,
+      ),
+    );
   }
 
   async function ask(path) {
@@ -75,11 +96,11 @@
   }
 
   /** The sensor included, a few stray points not. */
-  function span(values) {
+  function span(values, sensor) {
     values.sort((a, b) => a - b);
     const stray = Math.floor(values.length / 300);
-    const low = Math.min(-0.5, values[stray] ?? 0);
-    const high = Math.max(0.5, values[values.length - 1 - stray] ?? 0);
+    const low = Math.min(sensor - 0.5, values[stray] ?? sensor);
+    const high = Math.max(sensor + 0.5, values[values.length - 1 - stray] ?? sensor);
     return { centre: (low + high) / 2, half: (high - low) / 2 };
   }
 
@@ -93,15 +114,80 @@
     const middle = onFloor(controls().getTarget());
     const half = controls().distance * slope();
     const halves = [half * camera().aspect, half];
-    const inside = room.every(({ centre, half }, i) => Math.abs(centre - middle[i]) + half < halves[i]);
+    const inside = room.every(
+      ({ centre, half }, i) => Math.abs(centre - middle[i]) + EDGE * half < halves[i],
+    );
     return inside && room.some(({ half }, i) => half > SMALL * halves[i]);
+  }
+
+  /** Whether the next drag says where the sensor is and where it looks. */
+  function setPlacing(wanted) {
+    placing?.remove();
+    placing = wanted ? poseCatcher() : null;
+    if (placing) document.body.append(placing);
+  }
+
+  /** A sheet over the scene: pressed where the sensor is, dragged to where it looks. */
+  function poseCatcher() {
+    const sheet = document.createElement("div");
+    sheet.className = "pose-catcher";
+    sheet.innerHTML = '<svg><path class="halo"/><path/></svg>';
+    let start = null;
+    const length = ({ clientX, clientY }) => Math.hypot(clientX - start.clientX, clientY - start.clientY);
+    const draw = (path) => sheet.querySelectorAll("path").forEach((line) => line.setAttribute("d", path));
+    sheet.addEventListener("pointerdown", (event) => {
+      if (start || event.button !== 0) return;
+      start = event;
+      sheet.setPointerCapture(event.pointerId);
+      draw(arrow(start, start));
+    });
+    sheet.addEventListener("pointermove", (event) => {
+      if (start?.pointerId === event.pointerId) draw(arrow(start, event));
+    });
+    sheet.addEventListener("pointerup", (event) => {
+      if (start?.pointerId !== event.pointerId) return;
+      if (length(event) >= SHORT_DRAG) tell(poseOf(start, event));
+      start = null;
+      draw("");
+    });
+    sheet.addEventListener("pointercancel", () => {
+      start = null;
+      draw("");
+    });
+    return sheet;
+  }
+
+  /** A dot, and an arrow from it once it has a length. */
+  function arrow({ clientX: x0, clientY: y0 }, { clientX: x1, clientY: y1 }) {
+    const dot = `M${x0 - 5} ${y0}a5 5 0 1 0 10 0a5 5 0 1 0 -10 0`;
+    if (Math.hypot(x1 - x0, y1 - y0) < SHORT_DRAG) return dot;
+    const along = Math.atan2(y1 - y0, x1 - x0);
+    const barb = (side) => `${x1 - 14 * Math.cos(along + side)} ${y1 - 14 * Math.sin(along + side)}`;
+    return `${dot}M${x0} ${y0}L${x1} ${y1}M${barb(0.5)}L${x1} ${y1}L${barb(-0.5)}`;
+  }
+
+  function poseOf(start, end) {
+    const [[x, y], [toX, toY]] = [start, end].map(floorAt);
+    return { type: "pose", x, y, heading: Math.atan2(toY - y, toX - x) };
+  }
+
+  /** Where the ray through a point of the window meets the floor. */
+  function floorAt({ clientX, clientY }) {
+    const eye = camera().position;
+    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    const [right, up] = [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
+    const beam = eye.clone().set(right, up, 0.5).unproject(camera()).sub(eye);
+    return onFloor(eye.clone().addScaledVector(beam, -eye.y / beam.y));
+  }
+
+  function tell(message) {
+    if (window.parent !== window) window.parent.postMessage(message, location.origin);
   }
 
   function forwardKey(event) {
     event.stopImmediatePropagation(); // viser would fly through the scene
     const { key, code, altKey, ctrlKey, metaKey, shiftKey } = event;
-    const message = { type: "keydown", key, code, altKey, ctrlKey, metaKey, shiftKey };
-    if (window.parent !== window) window.parent.postMessage(message, location.origin);
+    tell({ type: "keydown", key, code, altKey, ctrlKey, metaKey, shiftKey });
   }
 
   async function start() {
@@ -122,9 +208,9 @@
   document.head.append(style);
   window.addEventListener("keydown", forwardKey, true);
   for (const gesture of ["pointerdown", "wheel"]) {
-    window.addEventListener(gesture, () => (moved = true), { capture: true, passive: true });
+    window.addEventListener(gesture, () => (moved ||= !placing), { capture: true, passive: true });
   }
   const ready = start();
-  window.lidarView = { setRotate, fit };
+  window.lidarView = { setRotate, fit, setPlacing };
   keepFollowing();
 })();

@@ -16,14 +16,15 @@ export const NO_ANSWER = {
   detail: "The server did not answer. Check that it is running; the page reconnects by itself.",
 };
 
-/** Sends a request; resolves to the parsed answer, null if it has no body. Throws Problem. */
-export async function request(method, path, body) {
-  const options = { method };
-  if (body !== undefined) {
-    options.body = JSON.stringify(body);
-    options.headers = { "Content-Type": "application/json" };
-  }
-  const { ok, status, text } = await answerTo(path, options);
+/** Sends a request with a JSON body, if any. See `send`. */
+export function request(method, path, body) {
+  if (body === undefined) return send(method, path);
+  return send(method, path, { body: JSON.stringify(body), headers: { "Content-Type": "application/json" } });
+}
+
+/** Sends a request as it is; resolves to the parsed answer, null if it has no body. Throws Problem. */
+export async function send(method, path, options = {}) {
+  const { ok, status, text } = await answerTo(path, { method, ...options });
   if (!ok) throw problemOf(status, text);
   return text ? JSON.parse(text) : null;
 }

@@ -1,4 +1,5 @@
-// Controls tied to settings: each shows the state's value, and sends what the user enters.
+// Controls tied to settings: each shows the state's value, and sends what the user enters. What they are tied to is
+// a model {key, value(path), change(path, value)}: the server's settings, or a draft that is sent as a whole.
 
 import { el } from "./dom.js";
 import { changeSetting, setting } from "./session.js";
@@ -6,18 +7,20 @@ import { on } from "./store.js";
 
 const same = (value) => value;
 
+const SETTINGS = { key: "settings", value: setting, change: changeSetting };
+
 /** Ties a control to the setting at a dotted path; `show` and `read` convert to and from the control's value. */
-export function bind(control, path, { show = same, read = same } = {}) {
+export function bind(control, path, { show = same, read = same, model = SETTINGS } = {}) {
   const property = control.type === "checkbox" ? "checked" : "value";
   const refresh = () => {
-    const value = setting(path);
+    const value = model.value(path);
     if (value !== undefined && !held(control)) control[property] = show(value);
   };
   control.addEventListener(control.type === "range" ? "input" : "change", () => {
-    if (control.reportValidity()) changeSetting(path, read(control[property]));
+    if (control.reportValidity()) model.change(path, read(control[property]));
   });
   control.addEventListener("blur", refresh);
-  on(["settings"], refresh);
+  on([model.key], refresh);
   return control;
 }
 
@@ -33,13 +36,26 @@ export function switchRow(label, path, hint = "") {
 }
 
 /** A select with a label; options are [value, text] pairs. */
-export function selectRow(label, path, options) {
+export function selectRow(label, path, options, model) {
   const list = el(
     "select",
     { id: idOf(path) },
     ...options.map(([value, text]) => el("option", { value }, text)),
   );
-  return el("div", { class: "row" }, el("label", { for: list.id }, label), bind(list, path));
+  return el("div", { class: "row" }, el("label", { for: list.id }, label), bind(list, path, { model }));
+}
+
+/** One of a few, side by side: `choices` are [value, text] pairs; further attributes go to the group. */
+export function segmentedRow(label, path, choices, attributes = {}) {
+  const radios = choices.map(([value, text]) => {
+    const radio = el("input", { type: "radio", name: idOf(path), value, class: "visually-hidden" });
+    radio.addEventListener("change", () => changeSetting(path, value));
+    on(["settings"], () => (radio.checked = setting(path) === value));
+    return el("label", {}, radio, el("span", {}, text));
+  });
+  const group = el("fieldset", { class: "row segmented", ...attributes });
+  group.append(el("legend", {}, label), el("span", { class: "segments" }, ...radios));
+  return group;
 }
 
 /** A small toggle, several of which stand in a line. */

@@ -7,9 +7,18 @@ const samples = [];
 
 /** Notes a frame's figures, its age only if it was sent when it was made; `now` in seconds. */
 export function remember(frame, isNew, now = performance.now() / 1000) {
-  const { extract_us: extract, draw_us: draw, age_ms } = frame.timings;
-  const age = isNew ? age_ms * 1e3 : NaN;
-  samples.push({ now, extract, draw, age, summary: frame.summary, kind: frame.source.kind });
+  const { summary, localization, clusters, timings, source } = frame;
+  samples.push({
+    now,
+    kind: source.kind,
+    summary,
+    localization,
+    extract: timings.extract_us,
+    cluster: clusters ? timings.cluster_us : NaN,
+    locate: localization ? timings.locate_us : NaN,
+    draw: timings.draw_us,
+    age: isNew ? timings.age_ms * 1e3 : NaN,
+  });
   if (samples.length > LENGTH) samples.shift();
 }
 
@@ -24,12 +33,10 @@ export function quantile(read, part) {
   return known.sort((a, b) => a - b)[Math.floor(part * known.length)] ?? NaN;
 }
 
-/** Columns for a plot: seconds before the newest frame, then one column per reader of a sample. */
-export function columns(readers) {
+/** Columns for a plot: seconds before the newest frame, then one column per reader of what `rows` makes of a sample. */
+export function columns(readers, rows = (sample) => [sample]) {
   const newest = samples.at(-1)?.now ?? 0;
+  const all = samples.flatMap((sample) => rows(sample).map((row) => ({ row, time: sample.now - newest })));
   const known = (value) => (Number.isFinite(value) ? value : null);
-  return [
-    samples.map(({ now }) => now - newest),
-    ...readers.map((read) => samples.map((s) => known(read(s)))),
-  ];
+  return [all.map(({ time }) => time), ...readers.map((read) => all.map(({ row }) => known(read(row))))];
 }

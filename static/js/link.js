@@ -9,6 +9,7 @@ import { get, on } from "./store.js";
 const WRITE_MS = 500;
 
 const LAYERS = "view.layers.";
+const LIVE = ["device", "emulator", "simulation"];
 
 /** Settings besides the numbers that a link carries: name in the link -> path, and how it is read. */
 const NAMED = {
@@ -18,6 +19,10 @@ const NAMED = {
   methods: { path: "view.methods", read: (text) => text.split(",").filter(Boolean) },
   colour: { path: "view.colour", read: String },
   scale: { path: "view.ellipse_scale", read: Number },
+  mode: { path: "navigation.mode", read: String },
+  landmarks: { path: "navigation.landmarks", read: String },
+  motion: { path: "navigation.motion", read: String },
+  clusters: { path: "clusters.method", read: String },
   rotate: { path: "view.rotate", read: (text) => text === "true" },
 };
 
@@ -75,7 +80,8 @@ function decode(hash, fields) {
 }
 
 function sourceOf(link) {
-  if (!link.has("recording")) return { kind: link.get("live") === "device" ? "device" : "emulator" };
+  const live = link.get("live");
+  if (!link.has("recording")) return { kind: LIVE.includes(live) ? live : "emulator" };
   const source = {
     kind: "recording",
     name: link.get("recording"),

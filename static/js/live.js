@@ -1,6 +1,11 @@
 // Words for what plays, and for how a live source is doing.
 
-export const KINDS = { device: "Device", emulator: "Emulator", recording: "Recording" };
+export const KINDS = {
+  device: "Device",
+  emulator: "Emulator",
+  simulation: "Simulation",
+  recording: "Recording",
+};
 
 const DEVICE_STATES = {
   connecting: "Connecting",
@@ -20,6 +25,7 @@ const PLAYER_STATES = {
 
 export function nameOf({ kind, recording, device }) {
   if (kind === "recording") return recording;
+  if (kind === "simulation") return "Simulated robot";
   const model = device?.name ?? "lidar";
   return kind === "emulator" ? `Emulated ${model.replace("RPLIDAR ", "")}` : model;
 }

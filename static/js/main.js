@@ -2,15 +2,21 @@
 
 import { request } from "./api.js";
 import { mountColours } from "./colours.js";
+import { mountClusters } from "./clusters.js";
 import { mountCorners } from "./corners.js";
 import { mountDevice } from "./device.js";
 import { mountDevices } from "./devices.js";
 import { mountDial } from "./dial.js";
 import { mountFaults } from "./faults.js";
+import { mountFilter } from "./filter.js";
 import { mountHeader } from "./header.js";
 import { remember } from "./history.js";
+import { mountLandmark } from "./landmark.js";
+import { mountLandmarks, receiveLandmarks } from "./landmarks.js";
 import { mountLink } from "./link.js";
+import { mountMaps } from "./maps.js";
 import { mountMethod } from "./method.js";
+import { mountNavigation } from "./navigation.js";
 import { mountParameters } from "./parameters.js";
 import { mountPlots } from "./plots.js";
 import { mountRecordings } from "./recordings.js";
@@ -19,6 +25,7 @@ import { mountScene } from "./scene.js";
 import { fieldsOf } from "./schema.js";
 import { attempt, isPlaying, settings, transport } from "./session.js";
 import { mountShortcuts, press } from "./shortcuts.js";
+import { mountSimulation } from "./simulation.js";
 import { mountSource } from "./source.js";
 import { get, set } from "./store.js";
 import { connect } from "./stream.js";
@@ -39,9 +46,16 @@ mountTimeline();
 mountMethod();
 mountView();
 mountParameters();
+mountClusters();
+mountNavigation();
+mountLandmarks();
+mountLandmark();
+mountMaps();
+mountFilter();
 mountCorners();
 mountPlots();
 mountSource();
+mountSimulation();
 mountDevice();
 mountFaults();
 mountDevices();
@@ -51,7 +65,7 @@ mountRejections();
 mountShortcuts();
 
 set("opening", null);
-connect({ onOpen: join, onState: accept, onFrame: show });
+connect({ onOpen: join, onState: accept, onFrame: show, onLandmarks: receiveLandmarks });
 
 let joining; // no frame has come yet over this connection
 
@@ -71,6 +85,7 @@ async function learn() {
       request("GET", "settings/schema"),
     ]);
     set("methods", methods.fitters);
+    set("clusterers", methods.clusterers);
     set("fields", fieldsOf(schema));
     await begin();
   });
@@ -89,6 +104,7 @@ function accept(state) {
   settings.accept(state.settings);
   transport.accept(state.source);
   set("selection", state.selection);
+  set("localization", state.localization);
   set("recorder", state.recorder);
   set("ready", state.ready);
   known();

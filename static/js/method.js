@@ -1,9 +1,10 @@
 // Which fitter, which covariance, and which methods are compared.
 
-import { bind, idOf, switchRow } from "./bindings.js";
+import { bind, idOf, segmentedRow, switchRow } from "./bindings.js";
 import { $, el, setText, swatch } from "./dom.js";
 import { changeSetting, setting } from "./session.js";
 import { get, on } from "./store.js";
+import { capital } from "./units.js";
 
 const COVARIANCES = {
   consistent: "Exact to first order under the noise model: the fitter's own sensitivity to every point.",
@@ -34,15 +35,11 @@ function fitterRows(methods) {
 }
 
 function covarianceRows() {
-  const choices = Object.keys(COVARIANCES).map((kind) => {
-    const radio = el("input", { type: "radio", name: "covariance", value: kind, class: "visually-hidden" });
-    radio.addEventListener("change", () => changeSetting("extraction.covariance", kind));
-    on(["settings"], () => (radio.checked = setting("extraction.covariance") === kind));
-    return el("label", {}, radio, el("span", {}, kind.charAt(0).toUpperCase() + kind.slice(1)));
-  });
-  const group = el("fieldset", { class: "row segmented", "aria-describedby": "covariance-about" });
-  group.append(el("legend", {}, "Covariance"), el("span", { class: "segments" }, ...choices));
-  return [group, el("p", { class: "muted about", id: "covariance-about" })];
+  const choices = Object.keys(COVARIANCES).map((kind) => [kind, capital(kind)]);
+  return [
+    segmentedRow("Covariance", "extraction.covariance", choices, { "aria-describedby": "covariance-about" }),
+    el("p", { class: "muted about", id: "covariance-about" }),
+  ];
 }
 
 function compareRows(methods) {

@@ -7,6 +7,8 @@ import { get, on } from "./store.js";
 import { displayOf } from "./units.js";
 
 const STEPS = 400;
+const FLATTEST = 0.1; // power of a slider: below it, the end is all there is to choose
+const LARGEST = 1e6; // of a slider's values
 const MUCH_MORE = 1.5; // times the noise told: beyond what one scan's estimate is off by chance
 const NOISE_LABELS = { sigma_range: "Range", sigma_bearing: "Bearing" };
 
@@ -47,40 +49,50 @@ const isNoise = ({ path }) => path.includes(".noise.");
 const isDefault = (field) => setting(field.path) === field.default;
 
 function fill(section, fields) {
-  section.replaceChildren(section.querySelector("h2"), ...fields.map(parameterRow));
+  section.replaceChildren(section.querySelector("h2"), ...fields.map((field) => parameterRow(field)));
 }
 
-/** A row of label, slider, number and unit for one numeric field of the schema. */
-export function parameterRow(field) {
+/** A row of label, slider, number and unit for one numeric field of the schema; `empty` says what none means. */
+export function parameterRow(field, { empty = "", model } = {}) {
   const { unit, scale, digits } = displayOf(field);
   const id = idOf(field.path);
   const minimum = field.minimum ?? field.above + scale * 10 ** -digits;
-  const text = (value) => String(Number((value / scale).toFixed(digits)));
+  const text = (value) => (value === null ? "" : String(Number((value / scale).toFixed(digits))));
   const number = el("input", {
     type: "number",
     id,
     min: text(minimum),
     max: text(field.maximum),
     step: field.integer ? "1" : "any",
+    placeholder: empty,
+    required: !field.nullable,
     inputmode: "decimal",
     "aria-describedby": `${id}-hint`,
   });
-  bind(number, field.path, { show: text, read: (shown) => tidy(Number(shown) * scale) });
+  const read = (shown) => (shown === "" ? null : tidy(Number(shown) * scale));
+  bind(number, field.path, { show: text, read, model });
   return el(
     "div",
     { class: "row parameter", title: field.description },
     el("label", { for: id }, field.label, el("span", { class: "visually-hidden" }, unit && ` in ${unit}`)),
-    slider(field, minimum, { unit, text }),
+    powerOf(field, minimum) > FLATTEST ? slider(field, minimum, { unit, text, model }) : el("span"),
     number,
     el("span", { class: "unit", "aria-hidden": "true" }, unit),
     el("small", { class: "hint", id: `${id}-hint` }, field.description),
   );
 }
 
-/** A slider along a power curve that puts the default in the middle. */
-function slider(field, minimum, { unit, text }) {
+/** Which power of the slider's position puts the default in the middle; 0 if none does, or there is no end to it. */
+function powerOf({ default: preset, maximum, nullable }, minimum) {
+  const part = (preset - minimum) / (maximum - minimum);
+  if (nullable || maximum > LARGEST) return 0;
+  return part > 0 && part < 1 ? Math.log(part) / Math.log(0.5) : 1;
+}
+
+/** A slider along a power curve. */
+function slider(field, minimum, { unit, text, model }) {
   const span = field.maximum - minimum;
-  const power = Math.log((field.default - minimum) / span) / Math.log(0.5);
+  const power = powerOf(field, minimum);
   const valueAt = (position) => minimum + span * (position / STEPS) ** power;
   const positionOf = (value) => STEPS * ((value - minimum) / span) ** (1 / power);
   const read = (position) => {
@@ -92,7 +104,7 @@ function slider(field, minimum, { unit, text }) {
     return positionOf(value);
   };
   const range = el("input", { type: "range", min: "0", max: String(STEPS), "aria-label": field.label });
-  return bind(range, field.path, { show, read: (position) => read(Number(position)) });
+  return bind(range, field.path, { show, read: (position) => read(Number(position)), model });
 }
 
 const tidy = (value) => Number(value.toPrecision(12));

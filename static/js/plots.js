@@ -1,87 +1,124 @@
-// Plots over time: stage times, corners and median ellipse area per method.
+// Plots over time: stage times, corners and median ellipse area per method; of the filter, whether what it
+// sees agrees with what it expects, and how sure it is.
 
-import { chartSize, makeChart, token } from "./chart.js";
+import { token } from "./chart.js";
 import { methodColour } from "./colours.js";
-import { $, el, setText, swatch } from "./dom.js";
+import { $, swatch } from "./dom.js";
+import { line, makeFigure, stroke } from "./figure.js";
 import { columns } from "./history.js";
+import { paced } from "./pace.js";
+import { errorOf, positionSigma } from "./pose.js";
 import { on } from "./store.js";
-import { fixed, microseconds, squareMillimetres } from "./units.js";
+import { fixed, microseconds, squareMillimetres, wholeMillimetres } from "./units.js";
 
 const REDRAW_MS = 400;
 
 const STAGES = [
-  { key: "extract", label: "Extraction", dash: [], tone: "--text" },
-  { key: "draw", label: "Drawing", dash: [], tone: "--edge" },
+  { key: "extract", label: "Extraction", tone: "--text" },
+  { key: "draw", label: "Drawing", tone: "--edge" },
+  { key: "cluster", label: "Clustering", tone: "--along" },
+  { key: "locate", label: "Localization", tone: "--across" },
   { key: "age", label: "Scan to page", dash: [4, 3], tone: "--muted" },
 ];
 
 const PLOTS = [
-  { title: "Time per scan", series: stages, log: true, text: microseconds },
-  { title: "Corners", series: perMethod("corners"), log: false, text: (value) => fixed(value, 0) },
-  { title: "Median ellipse area, mm²", series: perMethod("median_area"), log: true, text: squareMillimetres },
+  { title: "Time per scan", series: stages, scale: "decades", text: microseconds },
+  {
+    title: "Corners",
+    series: perMethod(({ corners }) => corners),
+    scale: "counts",
+    text: (value) => fixed(value, 0),
+  },
+  {
+    title: "Median ellipse area, mm²",
+    series: perMethod(({ median_area }) => median_area),
+    scale: "decades",
+    text: squareMillimetres,
+  },
 ];
 
-let plots = [];
-let drawn = 0;
+const FILTER_PLOTS = [
+  {
+    title: "Squared innovations, normalized (NIS)",
+    series: () => [
+      line({ label: "NIS", key: "nis", tone: "--text", read: ofFilter(({ nis, dof }) => dof && nis) }),
+    ],
+    band: {
+      label: "95 % of them, by chi-square",
+      read: [0, 1].map((end) => ofFilter(({ nis_band, dof }) => dof && nis_band[end])),
+    },
+    scale: "counts",
+    text: (value) => fixed(value, 0),
+  },
+  {
+    title: "Innovations, mm",
+    series: () => [
+      line({ label: "ahead", key: "along", tone: "--along", dots: true, read: ({ dx }) => dx }),
+      line({ label: "to the left", key: "across", tone: "--across", dots: true, read: ({ dy }) => dy }),
+    ],
+    rows: ({ localization }) => localization?.innovations ?? [],
+    scale: "outlying",
+    text: wholeMillimetres,
+  },
+  {
+    title: "Position, mm",
+    series: () => [
+      line({ label: "1σ", key: "sigma", tone: "--text", read: ofFilter(positionSigma) }),
+      line({
+        label: "true error",
+        key: "error",
+        tone: "--bad",
+        read: ofFilter((now) => errorOf(now)?.distance),
+      }),
+    ],
+    scale: "decades",
+    text: wholeMillimetres,
+  },
+];
+
+let figures = [];
 let made = "";
 
 export function mountPlots() {
-  on(["frame", "panel", "settings", "methods"], redraw);
-  new ResizeObserver(() => plots.forEach(({ chart }) => chart.setSize(chartSize()))).observe($("plots"));
+  const draw = paced(REDRAW_MS, redraw);
+  on(["frame", "panel", "settings", "methods"], (frame, panel) => panel === "plots" && draw(frame));
+}
+
+/** Reads a figure of the filter from a sample; nothing while it is off, or there is nothing to tell. */
+function ofFilter(read) {
+  return ({ localization }) => (localization && read(localization)) || null;
 }
 
 function stages() {
-  const mark = (key) => el("span", { class: `swatch stage ${key}`, "aria-hidden": "true" });
-  return STAGES.map(({ key, label, dash, tone }) => {
-    return { label, dash, colour: token(tone), mark: mark(key), read: (sample) => sample[key] || null };
-  });
+  return STAGES.map(({ key, ...stage }) => line({ ...stage, key, read: (sample) => sample[key] || null }));
 }
 
 function perMethod(figure) {
   return (methods) =>
     methods.map((name) => {
-      const read = ({ summary }) => summary[name]?.[figure];
+      const read = ({ summary }) => summary[name] && figure(summary[name]);
       return { label: name, colour: methodColour(name), mark: swatch(name), read };
     });
 }
 
-function redraw(frame, panel) {
-  if (panel !== "plots") return;
-  const wanted = `${frame.methods.join()} ${document.documentElement.dataset.theme}`;
-  if (wanted === made && performance.now() - drawn < REDRAW_MS) return;
-  if (wanted !== made) make(frame.methods);
+function redraw({ methods, localization }) {
+  const kinds = localization ? [...FILTER_PLOTS, ...PLOTS] : PLOTS;
+  const wanted = `${methods.join()} ${document.documentElement.dataset.theme} ${kinds.length}`;
+  if (wanted !== made) make(kinds, methods);
   made = wanted;
-  drawn = performance.now();
-  for (const plot of plots) {
-    plot.chart.setData(dataOf(plot));
-    showValues(plot);
-  }
+  for (const figure of figures) figure.redraw();
 }
 
-function make(methods) {
-  plots.forEach(({ chart }) => chart.destroy());
-  // The main method comes last: it is drawn on top of the others.
-  plots = PLOTS.map((kind) => ({ ...kind, series: kind.series(methods).reverse() }));
-  $("plots").replaceChildren(...plots.map(figure));
+function make(kinds, methods) {
+  for (const figure of figures) figure.remove();
+  figures = kinds.map((kind) => makeFigure(prepared(kind, methods)));
+  $("plots").replaceChildren(...figures.map(({ node }) => node));
 }
 
-const dataOf = ({ series }) => columns(series.map(({ read }) => read));
-
-function figure(plot) {
-  plot.values = plot.series.map(() => el("output", {}, "\u2013"));
-  const entries = plot.series.map(({ label, mark }, at) => el("li", {}, mark, label, plot.values[at]));
-  const box = el("div", { class: "chart" });
-  plot.chart = makeChart(plot, dataOf(plot), box, (chart) => showValues({ ...plot, chart }));
-  return el(
-    "figure",
-    {},
-    el("figcaption", {}, el("h2", {}, plot.title), el("ul", {}, ...entries.reverse())),
-    box,
-  );
-}
-
-/** The captions tell the values under the cursor, or else the newest. */
-function showValues({ chart, values, text }) {
-  const at = chart.cursor.idx ?? chart.data[0].length - 1;
-  values.forEach((output, index) => setText(output, text(chart.data[index + 1][at] ?? NaN)));
+/** The main method comes last: it is drawn on top of the others. */
+function prepared({ rows, band, ...kind }, methods) {
+  const series = kind.series(methods).reverse();
+  const readers = [...series, ...(band ? band.read.map((read) => ({ read })) : [])].map(({ read }) => read);
+  const filled = band && { label: band.label, mark: stroke("band"), colour: token("--band") };
+  return { ...kind, series, band: filled, columns: () => columns(readers, rows) };
 }

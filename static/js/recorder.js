@@ -52,7 +52,7 @@ function draw(recorder, { live }) {
 
 function hint(running, live, name) {
   if (running) return `Stop recording ${name} (W)`;
-  return live ? "Record what plays (W)" : "Only a device or the emulator can be recorded";
+  return live ? "Record what plays (W)" : "Only what is live can be recorded";
 }
 
 /** Two short lines. */

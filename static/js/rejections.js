@@ -1,24 +1,20 @@
 // "Why is my wall missing?": what was rejected in the current frame, by reason.
 
 import { $, el, setText } from "./dom.js";
+import { paced } from "./pace.js";
 import { on } from "./store.js";
 import { fixed } from "./units.js";
 
 const REFRESH_MS = 1000; // slower than the frames: these are sentences to read
 const MOST = 60;
 
-let drawn = 0;
-
 export function mountRejections() {
   on(["frame"], ({ rejections }) => setText($("rejection-count"), rejections.length));
-  on(["frame", "panel", "source"], (frame, panel, source) => {
-    const due = source.state !== "playing" || performance.now() - drawn > REFRESH_MS;
-    if (panel === "rejections" && due) draw(frame);
-  });
+  const list = paced(REFRESH_MS, draw);
+  on(["frame", "panel"], (frame, panel) => panel === "rejections" && list(frame));
 }
 
 function draw({ rejections }) {
-  drawn = performance.now();
   const groups = Map.groupBy(rejections.slice(0, MOST), ({ kind, reason }) => `${kind}: ${reason}`);
   const sections = [...groups].map(([title, items]) => group(title, items));
   const beyond = rejections.length - MOST;

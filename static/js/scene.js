@@ -4,10 +4,17 @@ import { $ } from "./dom.js";
 import { setting, toggleSetting } from "./session.js";
 import { on } from "./store.js";
 
-const view = () => $("scene").contentWindow?.lidarView;
+/** What the scene's frame offers, once it has started. */
+export const view = () => $("scene").contentWindow?.lidarView;
+
+const handlers = new Map(); // by the type of the message
+
+/** Calls `run(message)` for messages of a type from the scene's frame. */
+export const onSceneMessage = (type, run) => handlers.set(type, run);
 
 /** `press(event)` receives the keys pressed in the scene. */
 export function mountScene(press) {
+  onSceneMessage("keydown", press);
   $("fit").addEventListener("click", fitScene);
   $("rotate").addEventListener("click", () => toggleSetting("view.rotate"));
   $("scene").addEventListener("load", applyRotation);
@@ -15,7 +22,7 @@ export function mountScene(press) {
   on(["frame"], () => $("stage").classList.remove("waiting"));
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
-    if (ours && data?.type === "keydown") press(data);
+    if (ours) handlers.get(data?.type)?.(data);
   });
 }
 

@@ -22,6 +22,7 @@ export const toggleSetting = (path) => changeSetting(path, !setting(path));
 const NOT_OPENED = {
   device: "The device could not be opened",
   emulator: "The emulator could not be started",
+  simulation: "The simulation could not be started",
   recording: "The recording could not be opened",
 };
 
@@ -53,17 +54,19 @@ export function togglePlaying() {
   transport.patch({ state: isPlaying(get("source")) ? "paused" : "playing" });
 }
 
-/** Selects a corner by its id, null none; a corner that is gone by now leaves the selection as it was. */
-export async function select(corner) {
+/** Selects {corner} or {landmark} by its id, null none; one that is gone by now leaves the selection as it was. */
+export async function select(change) {
   const before = get("selection");
-  set("selection", { corner });
+  set("selection", { ...before, ...change });
   try {
-    await request("PUT", "selection", { corner });
+    await request("PUT", "selection", change);
   } catch (problem) {
     set("selection", before);
     if (problem.status !== 404) report(problem);
   }
 }
+
+export const selectNothing = () => select({ corner: null, landmark: null });
 
 /** Runs what may fail; reports the failure under the title. */
 export async function attempt(action, title) {

@@ -1,15 +1,34 @@
 // Keyboard shortcuts, declared once: they work, and the help dialog lists them.
 
-import { selectNeighbour } from "./corners.js";
+import { nextCorner } from "./corners.js";
 import { $, el } from "./dom.js";
+import { nextLandmark } from "./landmarks.js";
 import { toggleMethod } from "./method.js";
+import { nextMode } from "./navigation.js";
+import { cancelPlacing, togglePlacing } from "./placing.js";
 import { toggleRecording } from "./recorder.js";
 import { fitScene } from "./scene.js";
-import { changeSetting, select, setting, step, togglePlaying, toggleSetting, transport } from "./session.js";
+import {
+  changeSetting,
+  selectNothing,
+  setting,
+  step,
+  togglePlaying,
+  toggleSetting,
+  transport,
+} from "./session.js";
 import { get } from "./store.js";
 import { toggleTheme } from "./theme.js";
 
-const LAYERS = { p: "points", s: "segments", o: "corners", e: "ellipses", x: "rejected", g: "grid" };
+const LAYERS = {
+  p: "points",
+  s: "segments",
+  o: "corners",
+  e: "ellipses",
+  k: "clusters",
+  x: "rejected",
+  g: "grid",
+};
 const KEY_NAMES = {
   " ": "Space",
   ArrowLeft: "←",
@@ -35,16 +54,18 @@ const SHORTCUTS = [
   { keys: ["v"], about: "Consistent or published covariance", run: swapCovariance },
   {
     keys: Object.keys(LAYERS),
-    about: "Points, segments, corners, ellipses, rejected, grid",
+    about: "Points, segments, corners, ellipses, clusters, rejected, grid",
     run: (key) => toggleSetting(`view.layers.${LAYERS[key]}`),
   },
   { keys: ["-", "+"], about: "Smaller, larger ellipses", run: scaleEllipses },
   {
     keys: ["ArrowUp", "ArrowDown"],
-    about: "Previous, next corner",
-    run: (key) => selectNeighbour(key === "ArrowUp" ? -1 : 1),
+    about: "Previous, next corner; landmark while the map is open",
+    run: (key) => (get("panel") === "map" ? nextLandmark : nextCorner)(key === "ArrowUp" ? -1 : 1),
   },
-  { keys: ["Escape"], about: "Select no corner", run: () => select(null) },
+  { keys: ["Escape"], about: "Select nothing, set no pose", run: () => cancelPlacing() || selectNothing() },
+  { keys: ["m"], about: "Off, SLAM, localize", run: nextMode },
+  { keys: ["i"], about: "Set the pose by dragging", run: togglePlacing },
   { keys: ["f"], about: "Fit the room in the view", run: fitScene },
   { keys: ["r"], about: "Rotate freely", run: () => toggleSetting("view.rotate") },
   { keys: ["t"], about: "Light or dark", run: toggleTheme },

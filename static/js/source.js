@@ -1,21 +1,24 @@
-// What plays: the switch between device, emulator and recording, and what is known of the source.
+// What plays: the switch between device, emulator, simulation and recording, and what is known of the source.
 
 import { $, el, remake, setText } from "./dom.js";
 import { KINDS, nameOf, stateOf, stateText } from "./live.js";
 import { refreshRecordings } from "./recordings.js";
 import { open } from "./session.js";
+import { simulate } from "./simulation.js";
 import { get, on } from "./store.js";
 import { toast } from "./toasts.js";
 
 const OPENING = {
   device: ({ port }) => `Connecting to ${port ?? "the device"}`,
   emulator: () => "Starting the emulator",
+  simulation: () => "Starting the simulation",
   recording: ({ name }) => `Opening ${name}`,
 };
 
 const ENDED = {
   device: "The device has gone",
   emulator: "The emulator has ended",
+  simulation: "The simulation has ended",
   recording: "The recording cannot be read on",
 };
 
@@ -34,12 +37,13 @@ function kindButton(kind) {
   return el("button", { type: "button", "data-kind": kind, onclick: () => choose(kind) }, KINDS[kind]);
 }
 
-/** Opens the only device, an emulator, or the recording that played last. */
+/** Opens the only device, an emulator, a simulation as it is set, or the recording that played last. */
 async function choose(kind) {
   const source = get("source");
   if (kind === source.kind && !source.error) return;
-  if (kind !== "recording") await open({ kind });
-  else await openRecording();
+  if (kind === "recording") await openRecording();
+  else if (kind === "simulation") await simulate();
+  else await open({ kind });
 }
 
 async function openRecording() {

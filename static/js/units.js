@@ -1,17 +1,25 @@
 // Units and number texts. The API speaks SI; people read millimetres and degrees.
 
 export const UNKNOWN = "\u2013";
-export const COMPLETE_HINT = "Share of the turn whose measurements arrived, whether or not they have a return";
+export const COMPLETE_HINT =
+  "Share of the turn whose measurements arrived, whether or not they have a return";
 
+const FIRST_YEAR = 1990; // with lidar logs
 const DEGREE = Math.PI / 180;
 
 /** How a field is shown: {unit, scale, digits}; shown value = SI value / scale. Small lengths go in mm. */
 export function displayOf({ unit, default: preset, integer }) {
-  if (unit === "rad") return { unit: "°", scale: DEGREE, digits: preset < 0.05 ? 3 : 1 };
-  if (unit === "m" && preset < 0.1) return { unit: "mm", scale: 0.001, digits: 1 };
-  if (unit === "m") return { unit: "m", scale: 1, digits: 3 };
-  return { unit, scale: 1, digits: integer ? 0 : 2 };
+  if (/^rad\b/.test(unit))
+    return { unit: unit.replace("rad", "°"), scale: DEGREE, digits: preset < 0.05 ? 3 : 1 };
+  if (/^m\b/.test(unit) && preset !== null && preset < 0.1)
+    return { unit: unit.replace("m", "mm"), scale: 0.001, digits: 1 };
+  if (/^m\b/.test(unit)) return { unit, scale: 1, digits: 3 };
+  return { unit, scale: 1, digits: integer ? 0 : Math.max(3, decimals(preset) + 1) };
 }
+
+const decimals = (value) => String(value).split(".")[1]?.length ?? 0;
+
+export const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
 /** Number text with a true minus sign. */
 export function fixed(value, digits) {
@@ -19,9 +27,10 @@ export function fixed(value, digits) {
 }
 
 export const metres = (value) => fixed(value, 3);
-export const millimetres = (value) => fixed(value * 1e3, value < 0.1 ? 1 : 0);
+export const millimetres = (value) => fixed(value * 1e3, Math.abs(value) < 0.1 ? 1 : 0);
+export const wholeMillimetres = (value) => fixed(value * 1e3, 0);
 export const degrees = (value) => fixed(value / DEGREE, 1);
-export const squareMillimetres = (value) => fixed(value * 1e6, value < 1e-5 ? 1 : 0);
+export const squareMillimetres = (value) => fixed(value * 1e6, Math.abs(value) < 1e-5 ? 1 : 0);
 
 /** A duration given in microseconds: three digits and a unit that fits. */
 export function microseconds(value) {
@@ -48,6 +57,28 @@ export function clock(seconds) {
   const tenths = Math.round(seconds * 10);
   const rest = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
   return `${Math.floor(tenths / 600)}:${rest}`;
+}
+
+/** A stamp in seconds as a time of the day, with the date if that is another; stamps of some logs count from their start. */
+export function moment(stamp) {
+  const then = new Date(1e3 * stamp);
+  if (then.getFullYear() < FIRST_YEAR) return `${fixed(stamp, 1)}\u2009s`;
+  const time = then.toLocaleTimeString("en-GB");
+  return then.toDateString() === new Date().toDateString()
+    ? time
+    : `${then.toLocaleDateString("en-CA")} ${time}`;
+}
+
+/** How long ago, in the largest unit that fits. */
+export function ago(seconds) {
+  const units = [
+    [86400, "d"],
+    [3600, "h"],
+    [60, "min"],
+    [1, "s"],
+  ];
+  const [size, unit] = units.find(([size]) => seconds >= size) ?? units.at(-1);
+  return Number.isFinite(seconds) ? `${Math.max(0, Math.floor(seconds / size))}\u2009${unit}` : UNKNOWN;
 }
 
 /** A file size in bytes. */

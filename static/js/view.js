@@ -1,24 +1,24 @@
 // What the scene shows: layers, colours, the size of the ellipses, and the legend that says so.
 
 import { chip, selectRow, switchRow } from "./bindings.js";
-import { $, el, setText, swatch } from "./dom.js";
+import { $, el, remake, swatch } from "./dom.js";
+import { stroke } from "./figure.js";
 import { parameterRow } from "./parameters.js";
 import { on } from "./store.js";
 import { fixed } from "./units.js";
 
-const LAYER_HINTS = { rejected: "Candidates that became neither segment nor corner" };
+const OF_MAP = ["pose", "trail", "dead_reckoned", "truth", "landmarks", "associations"];
 
 const COLOURS = { plain: "Plain", segment: "By segment", quality: "By quality", range: "By range" };
 
 export function mountView() {
   on(["fields"], (fields) => {
-    const layers = fields.filter(({ path }) => path.startsWith("view.layers."));
     const colour = fields.find(({ path }) => path === "view.colour");
     const scale = fields.find(({ path }) => path === "view.ellipse_scale");
     const options = colour.options.map((value) => [value, COLOURS[value] ?? value]);
     $("view").replaceChildren(
       $("view").querySelector("h2"),
-      layerChips(layers),
+      layerChips(fields, { ofMap: false }),
       selectRow("Point colour", "view.colour", options),
       parameterRow({ ...scale, label: "Ellipse scale", unit: "× σ" }),
     );
@@ -27,25 +27,42 @@ export function mountView() {
   on(["frame", "settings", "methods"], drawLegend);
 }
 
-function layerChips(fields) {
-  const chips = fields.map(({ path, key, label }) => chip(label, path, LAYER_HINTS[key]));
+/** Toggles for the layers of the scene: those of a scan, or those of the map. */
+export function layerChips(fields, { ofMap }) {
+  const layers = fields.filter(
+    ({ path, key }) => path.startsWith("view.layers.") && OF_MAP.includes(key) === ofMap,
+  );
+  const chips = layers.map(({ path, label, description }) => chip(label, path, description));
   const group = el("fieldset", { class: "chips" });
   group.append(el("legend", { class: "visually-hidden" }, "Layers"), ...chips);
   return group;
 }
 
-let shown = "";
+/** The ways of the sensor that the scene may show: layer -> sign, and whether it is known. */
+const PATHS = [
+  { layer: "trail", sign: "trail", label: "Estimated way", isKnown: () => true },
+  {
+    layer: "dead_reckoned",
+    sign: "reckoned",
+    label: "By odometry alone",
+    isKnown: ({ dead_reckoned: way }) => way,
+  },
+  { layer: "truth", sign: "true", label: "True way", isKnown: ({ truth }) => truth },
+];
 
-/** The legend names the methods in the frame and states by how much the ellipses are enlarged. */
+/** The legend names the methods and ways in the frame and states by how much the ellipses are enlarged. */
 function drawLegend(frame, settings, methods) {
-  const key = frame.methods.join();
-  if (key !== shown) {
-    shown = key;
-    const titles = new Map(methods.map(({ name, title }) => [name, title]));
-    const entries = frame.methods.map((name) => el("li", {}, swatch(name), titles.get(name) ?? name));
-    $("legend").replaceChildren(el("ul", {}, ...entries), el("p", {}));
-  }
   const { ellipse_scale: scale, layers } = settings.view;
+  const { localization: now } = frame;
+  const paths = PATHS.filter(({ layer, isKnown }) => now && layers[layer] && isKnown(now));
   const ellipses = `Ellipses 1σ × ${fixed(scale, Number.isInteger(scale) ? 0 : 1)}, ${frame.covariance}`;
-  setText($("legend").lastChild, layers.ellipses ? ellipses : "Ellipses hidden");
+  const shown = [frame.methods, paths, layers.ellipses];
+  remake($("legend"), [...shown, ellipses], () => {
+    const titles = new Map(methods.map(({ name, title }) => [name, title]));
+    const entries = [
+      ...frame.methods.map((name) => el("li", {}, swatch(name), titles.get(name) ?? name)),
+      ...paths.map(({ sign, label }) => el("li", {}, stroke(sign), label)),
+    ];
+    return [el("ul", {}, ...entries), el("p", {}, layers.ellipses ? ellipses : "Ellipses hidden")];
+  });
 }

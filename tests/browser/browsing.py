@@ -96,14 +96,14 @@ class Server:
     def reset(self) -> None:
         """As after its start: the emulator plays, settings are the defaults, the folder is empty."""
         self.api.post("recorder/stop")
-        self.api.put("selection", json={"corner": None}).raise_for_status()
-        self.patch("settings", {"extraction": None, "view": None})
-        self._emulate()
+        self.api.put("selection", json={"corner": None, "landmark": None}).raise_for_status()
+        self.patch("settings", {"extraction": None, "clusters": None, "navigation": None, "view": None})
+        self.emulate()
         for recording in self.get("recordings")["recordings"]:
             if not recording["builtin"]:
                 self.api.delete(f"recordings/{recording['name']}").raise_for_status()
 
-    def _emulate(self) -> None:
+    def emulate(self) -> None:
         """Starting an emulator takes a second: one that runs is only made whole again."""
         source = self.get("source")
         if source["kind"] != "emulator":

@@ -6,7 +6,8 @@ import pytest
 from browsing import Visitor, wait_until
 from playwright.sync_api import expect
 
-PANELS = ("Corners", "Setup", "Plots", "Source", "Rejected")
+PANELS = ("Corners", "Setup", "Map", "Plots", "Source", "Rejected")
+MAPPED = {"view": {"compare": True}, "navigation": {"mode": "slam"}}
 CONTROLS = {
     "button", "checkbox", "combobox", "link", "radio", "slider", "spinbutton", "switch", "tab", "Iframe",
 }  # fmt: skip
@@ -62,7 +63,7 @@ def contrast(a: list[float], b: list[float]) -> float:
 
 
 def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
-    phone.server.patch("settings", {"view": {"compare": True}})
+    phone.server.patch("settings", MAPPED)
     for panel in PANELS:
         phone.page.get_by_role("tab", name=panel).click()
         assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
@@ -88,7 +89,7 @@ def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], t
     visitor = visit(1400, 900, theme=theme).open()
     wait_until(lambda: visitor.server.get("settings")["view"]["theme"] == theme, "the preference is taken")
     expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)
-    visitor.server.patch("settings", {"view": {"compare": True}})
+    visitor.server.patch("settings", MAPPED)
     visitor.server.patch("source", {"state": "paused"})  # the corner that is selected stays
     visitor.page.keyboard.press("ArrowDown")
     for panel in PANELS[1:]:
@@ -110,7 +111,7 @@ def test_theme_button_turns_the_page_and_the_scene(visit: Callable[..., Visitor]
 
 
 def test_every_control_has_a_name(visitor: Visitor) -> None:
-    visitor.server.patch("settings", {"view": {"compare": True}})
+    visitor.server.patch("settings", MAPPED)
     session = visitor.page.context.new_cdp_session(visitor.page)
     for panel in PANELS[1:]:
         visitor.page.get_by_role("tab", name=panel).click()

@@ -26,6 +26,8 @@ def extraction(server: Server) -> dict:
         ("v", lambda server: extraction(server)["covariance"] == "published"),
         ("g", lambda server: not view(server)["layers"]["grid"]),
         ("x", lambda server: view(server)["layers"]["rejected"]),
+        ("k", lambda server: view(server)["layers"]["clusters"]),
+        ("m", lambda server: server.get("settings")["navigation"]["mode"] == "slam"),
         ("+", lambda server: view(server)["ellipse_scale"] > 10),
         ("r", lambda server: view(server)["rotate"]),
         ("t", lambda server: view(server)["theme"] == "light"),

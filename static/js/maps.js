@@ -1,0 +1,162 @@
+// The maps there are, one for each session: localized in, saved, loaded from a file and deleted here.
+
+import { address, request, send } from "./api.js";
+import { $, el, icon, iconButton, remake } from "./dom.js";
+import { reloadLandmarks } from "./landmarks.js";
+import { attempt, changeSetting } from "./session.js";
+import { get, on, set } from "./store.js";
+import { QUESTION_MS, toast } from "./toasts.js";
+import { moment, wholeNumber } from "./units.js";
+
+const FORMATS = { json: "JSON", csv: "CSV", geojson: "GeoJSON", png: "Picture", zip: "ROS map" };
+const LOADED = ["json", "csv", "geojson"];
+
+const clearButton = el(
+  "button",
+  { type: "button", onclick: () => confirmClear(get("localization").session) },
+  "Clear",
+);
+
+export function mountMaps() {
+  const picker = el("input", {
+    type: "file",
+    class: "visually-hidden",
+    id: "map-file",
+    accept: LOADED.map((ending) => `.${ending}`).join(),
+    "aria-label": "Map to load",
+  });
+  picker.addEventListener("change", () => {
+    load(picker.files[0]);
+    picker.value = "";
+  });
+  $("maps").append(
+    el("div", { id: "map-list" }),
+    el("div", { class: "buttons", id: "map-save" }),
+    el(
+      "div",
+      { class: "buttons" },
+      picker,
+      el("label", { class: "button", for: picker.id }, icon("upload"), "Load a file"),
+      clearButton,
+    ),
+  );
+  on(["panel", "localization"], refresh);
+  on(["maps", "localization", "landmarks"], draw);
+}
+
+let listed = ""; // when the maps were asked for: with which panel open and which map in use
+
+function refresh(panel, { session }) {
+  const wanted = `${panel} ${session}`;
+  if (panel === "map" && listed !== wanted) list();
+  listed = wanted;
+}
+
+async function list() {
+  const maps = await attempt(() => request("GET", "sessions"), "The maps could not be listed");
+  if (maps) set("maps", maps);
+}
+
+function draw({ sessions, store }, { session }, landmarks) {
+  const live = { session, landmarks: landmarks.size };
+  remake($("map-list"), [sessions, store.error, live], () => rows(sessions, store, live));
+  const saved = session ?? sessions.at(-1)?.id ?? null;
+  remake($("map-save"), saved, () => (saved === null ? [] : saveLinks(saved)));
+  clearButton.disabled = session === null;
+}
+
+function rows(sessions, { error }, live) {
+  return [
+    ...(error ? [el("p", { class: "fault", role: "alert" }, error)] : []),
+    ...(sessions.length ? [] : [el("p", { class: "muted" }, "None yet. SLAM builds one, or load a file.")]),
+    el("ul", { class: "entries" }, ...[...sessions].reverse().map((session) => row(session, live))),
+  ];
+}
+
+function row({ id, source, mode, started, landmarks }, live) {
+  const isUsed = id === live.session;
+  const count = isUsed ? Math.max(landmarks, live.landmarks) : landmarks;
+  const button = el(
+    "button",
+    {
+      type: "button",
+      class: "entry",
+      title: `Localize in map ${id}`,
+      "data-key": `map-${id}`,
+      onclick: () => localizeIn(id),
+    },
+    el("span", {}, `Map ${id}`),
+    el("small", {}, `${wholeNumber(count)} landmarks`),
+  );
+  if (isUsed) button.setAttribute("aria-current", "true");
+  const about = [source, mode === "import" ? "loaded" : null, moment(started)].filter(Boolean).join(", ");
+  const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, count));
+  return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
+}
+
+const saveLinks = (session) => [
+  el("p", { class: "muted" }, `Save map ${session} as`),
+  ...Object.entries(FORMATS).map(([format, name]) =>
+    el(
+      "a",
+      {
+        class: "button",
+        href: address(`map?format=${format}&session=${session}`).href,
+        download: `map-${session}.${format}`,
+        "aria-label": `Save map ${session} as ${name}`,
+      },
+      name,
+    ),
+  ),
+];
+
+async function localizeIn(session) {
+  const chosen = await attempt(
+    () => request("PUT", "localization/map", { session }),
+    "The map was not taken",
+  );
+  if (chosen) await changeSetting("navigation.mode", "localize");
+}
+
+function confirmDelete(session, count) {
+  const remove = async () => {
+    await attempt(() => request("DELETE", `sessions/${session}`), "The map was not deleted");
+    await list();
+  };
+  toast(`Its ${wholeNumber(count)} landmarks and their history go with it.`, {
+    title: `Delete map ${session}?`,
+    action: { label: "Delete", run: remove },
+    linger: QUESTION_MS,
+  });
+}
+
+/** SLAM would bring back what it sees; so it begins with an empty map of its own. */
+function confirmClear(session) {
+  const clear = async () => {
+    if (get("settings").navigation.mode === "slam") await request("POST", "localization/reset");
+    await request("DELETE", `landmarks?session=${session}`);
+    await Promise.all([list(), reloadLandmarks()]);
+  };
+  toast("Its landmarks and their history are given up; SLAM begins with an empty map.", {
+    title: `Clear map ${session}?`,
+    action: { label: "Clear", run: () => attempt(clear, "The map was not cleared") },
+    linger: QUESTION_MS,
+  });
+}
+
+async function load(file) {
+  if (!file) return;
+  const [, format] = /\.(\w+)$/.exec(file.name.toLowerCase()) ?? [];
+  const query = new URLSearchParams({
+    format: LOADED.includes(format) ? format : LOADED[0],
+    name: file.name,
+  });
+  const loaded = await attempt(() => send("POST", `map?${query}`, { body: file }), "The map was not taken");
+  if (!loaded) return;
+  await list();
+  const action = { label: "Localize in it", run: () => localizeIn(loaded.id) };
+  toast(`${file.name}: ${wholeNumber(loaded.landmarks)} landmarks`, {
+    title: `Map ${loaded.id} is loaded`,
+    action,
+  });
+}

@@ -1,0 +1,260 @@
+"""Where the sensor is, in the page: SLAM switched on, landmarks looked at, the pose set by hand, maps kept."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from browsing import Server, Visitor, drawn, wait_until
+from numpy.typing import NDArray
+from playwright.sync_api import Browser, Page, expect
+from scipy import ndimage
+
+FEW = 5  # landmarks that a furnished room has soon
+Row = dict[str, Any]
+
+
+def landmarks(server: Server) -> list[Row]:
+    return server.get(f"landmarks?limit=1000&session={server.get('localization')['session']}")["landmarks"]
+
+
+def found_in(server: Server) -> str:
+    now = server.get("frame")["localization"]
+    return f"{now['mode']}, {now['state']}" if now else ""
+
+
+def slam(server: Server) -> None:
+    """A map of its own is built, and has some landmarks."""
+    server.patch("settings", {"navigation": {"mode": "slam", "landmarks": "corners"}})
+    wait_until(lambda: server.get("localization")["session"] is not None, "a map is written")
+    wait_until(lambda: len(landmarks(server)) >= FEW, "there are landmarks")
+
+
+@pytest.fixture(scope="module")
+def map_page(browser: Browser, running: Server) -> Iterator[Visitor]:
+    """One page for all: loading one for each would take half a minute."""
+    running.reset()
+    visitor = Visitor(browser.new_page(viewport={"width": 1000, "height": 640}, color_scheme="dark"), running)
+    yield visitor.open()
+    visitor.page.close()
+    visitor.check()
+
+
+@pytest.fixture
+def mapped(map_page: Visitor) -> Visitor:
+    """A page with the map's panel open, and a map of the emulator's room."""
+    map_page.page.get_by_role("tab", name="Map").click()
+    map_page.server.patch("settings", {"view": None, "clusters": None})
+    map_page.server.emulate()
+    slam(map_page.server)
+    return map_page
+
+
+def row_texts(page: Page) -> list[list[str]]:
+    rows = page.locator("#landmark-table tbody tr")
+    return rows.evaluate_all("rows => rows.map(row => [...row.cells].map(cell => cell.innerText))")
+
+
+def number(text: str) -> float:
+    return float(text.replace("\u2212", "-"))
+
+
+def test_slam_is_switched_on_and_landmarks_appear(map_page: Visitor) -> None:
+    page, server = map_page.page, map_page.server
+    page.get_by_role("tab", name="Map").click()
+    expect(page.locator("#whereabouts")).to_be_hidden()
+    page.locator("#navigation .segments label", has_text="SLAM").click()
+    expect(page.locator("#whereabouts-state")).to_have_text("Tracking")
+    wait_until(lambda: len(row_texts(page)) >= FEW, "landmarks are listed")
+    server.patch("source", {"state": "paused"})
+    listed: dict[str, list[str]] = {}
+
+    def all_are_listed() -> bool:
+        listed.update({name: rest for name, *rest in row_texts(page)})
+        return {name: int(rest[4]) for name, rest in listed.items()} == {
+            f"L{row['id']}": row["count"] for row in landmarks(server)
+        }
+
+    wait_until(all_are_listed, "all are listed as they are")
+    for row in landmarks(server):
+        kind, x, y, sigma, *_ = listed[f"L{row['id']}"]
+        variances = np.linalg.eigvalsh([[row["var_x"], row["cov_xy"]], [row["cov_xy"], row["var_y"]]])
+        assert kind == row["kind"]
+        assert (number(x), number(y)) == pytest.approx((row["x"], row["y"]), abs=5.1e-4)
+        assert number(sigma) == pytest.approx(1e3 * np.sqrt(variances[-1]), abs=0.51)
+    now = server.get("frame")["localization"]
+    expect(page.locator("#count-confirmed")).to_have_text(str(now["confirmed"]))
+    expect(page.locator("#count-matched")).to_have_text(str(len(now["innovations"])))
+    assert number(page.inner_text("#pose-x").split("\u2009")[0]) == pytest.approx(now["pose"]["x"], abs=6e-4)
+
+
+def test_landmark_clicked_shows_its_covariance_and_history(mapped: Visitor) -> None:
+    page, server = mapped.page, mapped.server
+    wait_until(lambda: len(row_texts(page)) >= FEW, "landmarks are listed")
+    page.locator("#landmark-table tbody tr").nth(2).click()
+    name = row_texts(page)[2][0]
+    expect(page.get_by_role("heading", name=f"Landmark {name}")).to_be_visible()
+    assert server.get("selection")["landmark"] == int(name[1:])
+    expect(page.locator("#landmark dl")).to_contain_text("Covariance")
+    expect(page.locator("#landmark canvas")).to_be_visible()
+    page.keyboard.press("ArrowDown")
+    wait_until(lambda: server.get("selection")["landmark"] == int(row_texts(page)[3][0][1:]), "the next one")
+    page.get_by_role("button", name="Close the details").click()
+    expect(page.locator("#landmark canvas")).to_have_count(0)
+    assert server.get("selection")["landmark"] is None
+
+
+def test_innovations_are_charted_with_the_band_they_should_lie_in(mapped: Visitor) -> None:
+    page = mapped.page
+    page.get_by_role("tab", name="Plots").click()
+    figure = page.locator("#plots figure", has_text="Squared innovations")
+    expect(figure.locator("output")).to_have_text(re.compile(r"^\d+$"))
+    expect(page.locator("#plots figure", has_text="Innovations, mm").locator("output").first).to_have_text(
+        re.compile(r"\d")
+    )
+    green = figure.locator("canvas").evaluate(
+        """canvas => {
+          const {data} = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+          let count = 0;
+          for (let at = 0; at < data.length; at += 4)
+            if (data[at + 3] && data[at + 1] > 1.3 * Math.max(data[at], data[at + 2])) count++;
+          return count;
+        }"""
+    )
+    assert green > 500, "the band is filled"
+    mapped.server.patch("settings", {"navigation": {"mode": "off"}})
+    expect(figure).to_have_count(0)
+
+
+def test_pose_is_set_by_dragging_in_the_scene(mapped: Visitor) -> None:
+    page, server = mapped.page, mapped.server
+    server.patch("source", {"state": "paused"})
+    mapped.fit()
+    to_world = world_of_pixels(mapped)
+    box = page.locator("#scene").bounding_box()
+    start, end = np.array([0.45, 0.5]), np.array([0.6, 0.35])
+    pixels = [part * [box["width"], box["height"]] for part in (start, end)]
+    page.get_by_role("button", name="Set pose").click()
+    expect(page.locator("#place-hint")).to_be_visible()
+    with page.expect_response("**/api/v1/pose") as told:
+        drag(page, *(at + np.array([box["x"], box["y"]]) for at in pixels))
+    pose = json.loads(told.value.request.post_data)
+    expected, to = (to_world(at) for at in pixels)
+    assert told.value.ok
+    assert (pose["x"], pose["y"]) == pytest.approx(expected, abs=0.05)
+    assert pose["heading"] == pytest.approx(np.arctan2(*(to - expected)[::-1]), abs=0.03)
+    expect(page.locator("#place-hint")).to_be_hidden()
+
+
+def world_of_pixels(visitor: Visitor) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """World (2,) m of a pixel of the scene, by where the corners of the frame are drawn."""
+    layers = visitor.server.get("settings")["view"]["layers"]
+    only = {name: name == "corners" for name in layers}
+    cover = visitor.page.add_style_tag(content=".legend, .dial, .scene-tools { visibility: hidden }")
+    before = visitor.still_picture()
+    visitor.server.patch("settings", {"view": {"layers": only}})
+    shown = drawn(visitor.still_picture(differs_from=before))
+    cover.evaluate("style => style.remove()")
+    shown[-3:] = False  # the border of what is below
+    markers, count = ndimage.label(shown)
+    pixels = np.array(ndimage.center_of_mass(shown, markers, range(1, count + 1)))[:, ::-1]
+    frame = visitor.server.get("frame")
+    pose, main = frame["localization"]["pose"], frame["fitter"]
+    c, s = np.cos(pose["heading"]), np.sin(pose["heading"])
+    seen = np.array([[corner["by_method"][main][axis] for axis in "xy"] for corner in frame["corners"]])
+    world = seen @ np.array([[c, s], [-s, c]]) + [pose["x"], pose["y"]]
+    assert len(pixels) == len(world)
+    pixels, world = pixels[np.argsort(pixels[:, 0])], world[np.argsort(world[:, 0])]
+    slope = np.ptp(world[:, 0]) / np.ptp(pixels[:, 0])
+    middle_pixel, middle = pixels.mean(0), world.mean(0)
+    return lambda at: middle + (at - middle_pixel) * [slope, -slope]
+
+
+def drag(page: Page, start: NDArray[np.float64], end: NDArray[np.float64]) -> None:
+    page.mouse.move(*start)
+    page.mouse.down()
+    page.mouse.move(*((start + end) / 2))
+    page.mouse.move(*end)
+    page.mouse.up()
+
+
+def test_setting_a_pose_is_given_up_by_escape_and_can_be_done_in_numbers(mapped: Visitor) -> None:
+    page = mapped.page
+    hint, catcher = page.locator("#place-hint"), page.frame_locator("#scene").locator(".pose-catcher")
+    page.keyboard.press("i")
+    expect(catcher).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(hint).to_be_hidden()
+    expect(catcher).to_have_count(0)
+    page.get_by_role("button", name="Set pose").click()
+    page.get_by_label("x, m").fill("0.1")
+    page.get_by_label("y, m").fill("-0.05")
+    page.get_by_label("Heading, °").fill("90")
+    with page.expect_response("**/api/v1/pose") as told:
+        page.get_by_role("button", name="Set", exact=True).click()
+    assert json.loads(told.value.request.post_data) == pytest.approx(
+        {"x": 0.1, "y": -0.05, "heading": np.pi / 2}
+    )
+
+
+def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
+    page, server = mapped.page, mapped.server
+    session = server.get("localization")["session"]
+    with page.expect_download() as saved:
+        page.get_by_role("link", name=f"Save map {session} as JSON").click()
+    kept = json.loads(saved.value.path().read_text())["landmarks"]
+    assert len(kept) >= FEW
+    file = {"name": "room.json", "mimeType": "application/json", "buffer": saved.value.path().read_bytes()}
+    page.locator("#map-file").set_input_files(file)
+    expect(page.locator(".toast")).to_contain_text(f"room.json: {len(kept)} landmarks")
+    page.get_by_role("button", name="Localize in it").click()
+    wait_until(lambda: server.get("localization")["session"] not in (None, session), "it is the map in use")
+    loaded = server.get("localization")["session"]
+    wait_until(lambda: found_in(server) == "localize, tracking", "the room is recognized")
+    expect(page.locator("#whereabouts-state")).to_have_text("Tracking")
+    assert server.get("settings")["navigation"]["mode"] == "localize"
+    assert {(row["x"], row["y"]) for row in landmarks(server)} == {(row["x"], row["y"]) for row in kept}
+    expect(page.locator("#map-list [aria-current]")).to_contain_text(f"Map {loaded}")
+    wait_until(lambda: len(row_texts(page)) == len(kept), "its landmarks are listed")
+    page.get_by_role("button", name=f"Delete map {session}").click()
+    page.get_by_role("button", name="Delete", exact=True).click()
+    expect(page.get_by_role("button", name=f"Delete map {session}")).to_have_count(0)
+    assert session not in [entry["id"] for entry in server.get("sessions")["sessions"]]
+
+
+def test_file_that_is_no_map_is_refused_in_plain_words(mapped: Visitor) -> None:
+    mapped.tolerated.append("422")
+    file = {"name": "room.json", "mimeType": "application/json", "buffer": b'{"unit": "mm"}'}
+    mapped.page.locator("#map-file").set_input_files(file)
+    expect(mapped.page.locator(".toast.error")).to_contain_text("convert it")
+
+
+def test_link_keeps_the_mode_and_what_the_landmarks_are(
+    mapped: Visitor, visit: Callable[..., Visitor]
+) -> None:
+    page, server = mapped.page, mapped.server
+    mode = {"mode": "slam", "landmarks": "clusters"}
+    server.patch("settings", {"clusters": {"method": "dbscan"}, "navigation": mode})
+    page.wait_for_url("**mode=slam&landmarks=clusters&clusters=dbscan**")
+    link = page.url.partition("#")[2]
+    server.patch("settings", {"clusters": None, "navigation": None})
+    visit().open(f"#{link}")
+    wait_until(lambda: server.get("settings")["clusters"]["method"] == "dbscan", "the method is set")
+    assert server.get("settings")["navigation"].items() >= mode.items()
+
+
+def test_simulation_is_set_up_and_started(mapped: Visitor) -> None:
+    page, server = mapped.page, mapped.server
+    page.get_by_role("tab", name="Source").click()
+    page.get_by_label("World").select_option(label="Corridor")
+    page.locator("#simulation summary").click()
+    page.get_by_role("spinbutton", name="Field of view in °").fill("180")
+    page.get_by_role("button", name="Start", exact=True).click()
+    expect(page.locator("#readout-source")).to_have_text("Simulated robot")
+    page.get_by_role("tab", name="Map").click()
+    expect(page.locator("#comparison")).to_contain_text("In truth")
+    expect(page.locator("#legend")).to_contain_text("True way")
+    bearings = [np.arctan2(y, x) for x, y in server.get("frame?points=true")["points"]]
+    assert max(np.abs(bearings)) == pytest.approx(np.pi / 2, abs=0.05)
