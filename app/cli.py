@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from app.cli_calibrate import calibrate
 from app.cli_devices import devices
 from app.cli_emulate import PASS_ON, emulate
 from app.cli_evaluate import evaluate
@@ -137,6 +138,7 @@ def info(recording: RecordingPath, topic: Topic = None) -> None:
         typer.echo(f"{name:20} {value}")
 
 
+cli.command()(calibrate)
 cli.command()(devices)
 cli.command()(record)
 cli.command()(localize)

@@ -93,6 +93,10 @@ class SimulationError(LidarError, ValueError):
     """What is to be simulated does not exist or does not fit: an unknown world or path, too many posts."""
 
 
+class EvaluationError(LidarError, ValueError):
+    """A study makes no sense or cannot go on: an unknown room, results of another study, no scheduler there."""
+
+
 class ServerUnreachableError(LidarError):
     """No server answers at this address."""
 

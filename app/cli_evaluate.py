@@ -1,0 +1,137 @@
+"""The command `lidarcore evaluate`: what each method claims, and what is so."""
+
+import errno
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from lidarcore import SensorNoise
+
+WIDTH = 160  # of the tables in a file or a pipe
+
+evaluate = typer.Typer(help="Measure against simulated truth what each method claims.", no_args_is_help=True)
+
+
+@evaluate.callback()
+def _evaluations() -> None:
+    """Keeps the name of the evaluation a part of the command while there is only one."""
+
+
+@evaluate.command()
+def consistency(
+    room: Annotated[
+        list[str] | None,
+        typer.Option(help="a simulated world, or a rectangle in m such as 4.5x2.5; may be repeated"),
+    ] = None,
+    noise: Annotated[
+        list[str] | None,
+        typer.Option(metavar="RANGE,BEARING", help="sigmas in m and rad, e.g. 0.02,0.0034; may be repeated"),
+    ] = None,
+    segments: Annotated[str, typer.Option(help="known, found (by the real segmentation), or both")] = "both",
+    trials: Annotated[int, typer.Option(min=1, help="corner trials in all, each by every method")] = 100_000,
+    beams: Annotated[int, typer.Option(min=90, help="beams in a revolution")] = 920,
+    seed: Annotated[int, typer.Option(min=0, help="of everything that is random")] = 0,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="processes; one for each core if not given")
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="a Dask scheduler, e.g. tcp://host:8786, whose workers do the work"
+        ),
+    ] = None,
+    results: Annotated[
+        Path | None,
+        typer.Option(help="keep finished parts in this file; the same command goes on from there"),
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="FILE.json or FILE.csv with every figure")
+    ] = None,
+    by_room: Annotated[bool, typer.Option("--by-room", help="a table for each room, too")] = False,
+) -> None:
+    """Bias, RMS error, coverage, ANEES and ellipse areas of every fitter with both covariances."""
+    from rich.console import Console
+
+    from app.consistency_table import tables
+    from lidarcore import FITTERS
+    from lidarcore.evaluation import consistency as monte_carlo
+    from lidarcore.evaluation import consistency_tables
+    from lidarcore.evaluation.trials import SEGMENTATIONS
+
+    if output is not None:  # told before minutes of work are lost
+        consistency_tables.check(output)
+        _check_folder(output)
+    if results is not None:
+        _check_folder(results)
+    if segments not in (*SEGMENTATIONS, "both"):
+        raise typer.BadParameter("--segments is known, found or both.")
+    usual = monte_carlo.Design()
+    design = monte_carlo.Design(
+        rooms=tuple(room or usual.rooms),
+        noises=tuple(map(_noise, noise)) if noise else usual.noises,
+        segmentations=tuple(s for s in SEGMENTATIONS if segments in (s, "both")),
+        trials=trials,
+        beams=beams,
+        seed=seed,
+    )
+    started = time.perf_counter()
+    with _progress(design.chunks) as progress, _resumable(results):
+        study = monte_carlo.study(design, workers or os.cpu_count() or 1, scheduler, results, progress)
+    took = time.perf_counter() - started
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    for table in tables(study, by_room):
+        console.print(table)
+    console.print(
+        f"{study.trials:,} corner trials, each by {len(FITTERS)} fitters, in {took:.1f} s. "
+        "± is half of a 95 % confidence interval; area: of the claimed ellipse over the actual one."
+    )
+    if output is not None:
+        consistency_tables.write(study, output)
+
+
+def _check_folder(file: Path) -> None:
+    if file.is_dir() or not file.absolute().parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "is no file in a folder that exists", str(file))
+
+
+def _noise(text: str) -> "SensorNoise":
+    from lidarcore import SensorNoise
+
+    try:
+        sigma_range, sigma_bearing = map(float, text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"--noise {text!r} should be two numbers, m and rad: 0.02,0.0034.") from None
+    return SensorNoise(sigma_range, sigma_bearing)
+
+
+@contextmanager
+def _resumable(results: Path | None) -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        again = (
+            "the same command goes on from there" if results else "with --results FILE it could be resumed"
+        )
+        typer.echo(f"Interrupted: {again}.", err=True)
+        raise SystemExit(130) from None
+
+
+@contextmanager
+def _progress(chunks: int) -> Iterator[Callable[[int, int], None]]:
+    """A bar on the terminal, if there is one."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=chunks)
+        yield lambda done, total: bar.update(task, completed=done, total=total)

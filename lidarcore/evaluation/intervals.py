@@ -1,0 +1,68 @@
+"""How well a figure of a Monte Carlo study is known: 95 % confidence intervals of ratios and of shares."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from lidarcore.scan import Array
+
+LEVEL = 0.95
+_Z = 1.959964  # of a normal, two-sided at LEVEL
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A figure and the ends of its 95 % confidence interval; NaN where there was nothing to make it of."""
+
+    value: float
+    low: float
+    high: float
+
+    def contains(self, value: float) -> bool:
+        """Whether the study is compatible with this value."""
+        return self.low <= value <= self.high
+
+    def root(self) -> "Interval":
+        """The same for the square root; what is below 0 by chance becomes 0."""
+        value, low, high = np.sqrt(np.maximum([self.value, self.low, self.high], 0.0)).tolist()
+        return Interval(value, low, high)
+
+
+def ratio(numerators: Array, denominators: Array) -> Interval:
+    """Sum over sum of independent blocks (B,), by the linearised variance of a ratio and Student's t.
+
+    Trials may depend on each other within a block: corners of one scan share a wall, scans share a place.
+    """
+    blocks, total = len(numerators), float(denominators.sum())
+    if total == 0:
+        return Interval(np.nan, np.nan, np.nan)
+    value = float(numerators.sum()) / total
+    if blocks < 2:
+        return Interval(value, -np.inf, np.inf)
+    half = float(stdtrit(blocks - 1, (1 + LEVEL) / 2)) * _standard_error(numerators, denominators, value)
+    return Interval(value, value - half, value + half)
+
+
+def share(hits: Array, trials: Array) -> Interval:
+    """The same for a share of trials: Wilson's interval, which stays within 0 and 1.
+
+    Its number of trials is that of independent ones with the scatter between blocks; all of them where the share is
+    0 or 1 and nothing scatters.
+    """
+    n = float(trials.sum())
+    if n == 0:
+        return Interval(np.nan, np.nan, np.nan)
+    p = float(hits.sum()) / n
+    variance = _standard_error(hits, trials, p) ** 2 if len(hits) > 1 else 0.0
+    if variance > 0:
+        n = min(n, p * (1 - p) / variance)
+    middle = (p + _Z**2 / (2 * n)) / (1 + _Z**2 / n)
+    half = _Z / (1 + _Z**2 / n) * float(np.sqrt(p * (1 - p) / n + _Z**2 / (4 * n * n)))
+    return Interval(p, max(middle - half, 0.0), min(middle + half, 1.0))
+
+
+def _standard_error(numerators: Array, denominators: Array, value: float) -> float:
+    blocks = len(numerators)
+    scatter = float(np.square(numerators - value * denominators).sum())
+    return float(np.sqrt(scatter * blocks / (blocks - 1))) / float(denominators.sum())
