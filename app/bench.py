@@ -8,9 +8,10 @@ from rich.console import Console
 from rich.table import Table
 
 from app.load import Load, measure_load
-from app.map_load import LIMIT_MS, measure_map_queries
+from app.map_load import measure_map_queries
 from lidarcore.evaluation.accuracy import measure_accuracy
 from lidarcore.evaluation.filter_speed import time_localizer, time_slam
+from lidarcore.evaluation.landmark_speed import LIMIT_MS
 from lidarcore.evaluation.speed import Timing, time_decoding, time_extraction, time_fits, time_growth
 from lidarcore.extraction import warm_up
 

@@ -14,7 +14,7 @@ from app.taken import Taken
 from app.trails import NO_PATHS, Paths, Row, Trails
 from lidarcore import Features, Scan
 from lidarcore.clusters import Clusters
-from lidarcore.errors import LocalizationError
+from lidarcore.errors import LandmarkMapError, LocalizationError
 from lidarcore.localization import NavigationSettings, Navigator, Whereabouts
 from lidarcore.scan import Array
 
@@ -52,7 +52,7 @@ class Run:
     navigator: Navigator
     written: LandmarkRun | None
     known: int | None
-    trails: Trails = field(default_factory=Trails)
+    trails: Trails
     shown: OrderedDict[int, Where] = field(default_factory=OrderedDict)
     newest: int = -1
 
@@ -173,7 +173,7 @@ class Navigation:
         self._run = self.problem = None
         if wanted.mode == "slam":
             written = self._store.begin(taken.name)
-            self._run = Run(taken.source, wanted, Navigator(wanted), written, None)
+            self._run = Run(taken.source, wanted, Navigator(wanted), written, None, Trails(own_frame=True))
         elif wanted.mode == "localize":
             self._run = self._localizing(taken, wanted)
         else:
@@ -183,8 +183,13 @@ class Navigation:
     def _localizing(self, taken: Taken, wanted: NavigationSettings) -> Run | None:
         session = self._map if self._map is not None else self._store.newest()
         self._store.use(session)
-        known = None if session is None else self._store.landmarks(session)
-        if not known:
-            self.problem = NO_MAP
+        try:
+            known = self._store.landmarks(session) if session is not None else ()
+            if session is None or not known:
+                self.problem = NO_MAP
+                return None
+            own_frame = self._store.atlas.session(session).mode == "slam"
+        except LandmarkMapError as error:  # deleted meanwhile, or the file cannot be read
+            self.problem = str(error)
             return None
-        return Run(taken.source, wanted, Navigator(wanted, known), None, session)
+        return Run(taken.source, wanted, Navigator(wanted, known), None, session, Trails(own_frame))

@@ -45,9 +45,13 @@ NO_PATHS = Paths(*(np.empty((0, 2)) for _ in range(3)))
 
 
 class Trails:
-    """The ways of one run, and its trajectory."""
+    """The ways of one run, and its trajectory.
 
-    def __init__(self) -> None:
+    A map that SLAM built has a frame of its own, in which the truth is placed by where the sensor is seen first.
+    """
+
+    def __init__(self, own_frame: bool) -> None:
+        self._own_frame = own_frame
         self.trajectory: deque[Row] = deque(maxlen=KEPT)
         self._estimated, self._dead_reckoned, self._true = Trail(), Trail(), Trail()
         self._T_world_truth: Array | None = None
@@ -73,9 +77,8 @@ class Trails:
         return Paths(self._estimated.points, self._dead_reckoned.points, self._true.points)
 
     def _placed(self, truth: Array, whereabouts: Whereabouts) -> Array:
-        """SLAM has a frame of its own, which begins where the sensor was first; a known map keeps that of the truth."""
         if self._T_world_truth is None:
-            shift = whereabouts.mode == "slam" and bool(np.isfinite(truth).all())
+            shift = self._own_frame and bool(np.isfinite(truth).all())
             start = whereabouts.estimate.pose
             self._T_world_truth = compose(start, inverse(truth)) if shift else np.zeros(3)
         return compose(self._T_world_truth, truth)

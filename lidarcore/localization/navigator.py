@@ -153,7 +153,7 @@ class Navigator:
             estimate = self._estimated(running, now, sightings, scan)
             message = f"{_fact(error)}: it goes on from the new values."
         self._continuity.accept(now)
-        self._reckoning.carry(now, self._estimate.pose)
+        self._reckoning.carry(now, estimate.pose)
         self._estimate = estimate
         return self._judge(running, before) or message
 
@@ -179,6 +179,9 @@ class Navigator:
             return str(error)
         running.reset(found.pose, _DOUBT * found.covariance)
         running.restart_clock()
+        if self._state == "starting":
+            self._reckoning.interrupt()
+            self._reckoning.place(found.pose)
         self._is_placed, self._state = True, "tracking"
         self._watch.restart()
         return None

@@ -149,3 +149,17 @@ def test_odometry_over_the_websocket_is_what_dead_reckoning_goes_by(server: Serv
         server.change("PUT", "/source", {"kind": "recording", "name": room.name})
         last = stream.frame(lambda frame: chosen(frame) and frame["source"]["index"] == 29)
     assert last["localization"]["dead_reckoned"]["x"] == pytest.approx(0.5 * 2.9, abs=1e-6)
+
+
+def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(driving: Server) -> None:
+    session = located(driving, lambda where: where["session"] is not None)["localization"]["session"]
+    driving.change("PUT", "/localization/map", {"session": session})
+    driving.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
+    located(driving, lambda where: where["mode"] == "localize")
+    assert driving.http.delete(f"/sessions/{session}").status_code == 204
+    driving.change("POST", "/localization/reset", None)
+    with driving.stream() as stream:
+        assert str(session) in stream.state(lambda s: s["localization"]["problem"])["localization"]["problem"]
+    driving.change("PUT", "/localization/map", {"session": None})
+    driving.change("PATCH", "/settings", SLAM)
+    located(driving, lambda where: where["mode"] == "slam")
