@@ -7,7 +7,7 @@ import numpy as np
 from viser import ViserServer
 
 from app.colours import Rgbs, untoned
-from app.shapes import DISC_FACES, DISC_VERTICES, Array, about_z, lift
+from app.shapes import DISC_FACES, DISC_VERTICES, Array, about_z, in_world, lift
 
 FIELD_OF_VIEW = np.radians(6.0)  # so narrow that the picture is nearly orthographic
 FAR = 2e4  # m
@@ -18,11 +18,17 @@ HEIGHTS = {  # from the floor up
     "landmark ring": 8,
 }  # fmt: skip
 
+BODY = frozenset(
+    ("gaps", "fill", "segments", "outline", "cluster fill", "clusters", "points", "rejected", "crosses", "markers",
+     "sensor", "ring")
+)  # fmt: skip
+
 
 class Canvas:
     """A map in layers: discs, strokes and points in metres, seen from above.
 
-    What hangs under /body is in the sensor frame, the rest in the world frame; `place` says where the sensor is.
+    What is under /body is given in the sensor frame, and `place` says where that is; the rest in the world frame.
+    All is sent in the world frame: a browser may take up a node's place and what is in it at different moments.
     """
 
     def __init__(self, server: ViserServer) -> None:
@@ -32,7 +38,7 @@ class Canvas:
         self._scene.configure_default_lights(enabled=False)
         self._scene.configure_environment_map(None)
         self._scene.add_light_ambient("/light", intensity=np.pi)  # flat: every surface shows its own colour
-        self._body = self._scene.add_frame("/body", show_axes=False)
+        self._pose = np.zeros(3)
         self._nodes: dict[str, Any] = {
             "grid": self._scene.add_grid(
                 "/grid", infinite_grid=True, fade_distance=FAR, fade_strength=0, shadow_opacity=0
@@ -79,9 +85,8 @@ class Canvas:
         self._set("grid", cell_size=step / 2, section_size=step, **lines)
 
     def place(self, pose: Array) -> None:
-        """Put what is in the sensor frame at T_world_sensor (3,)."""
-        self._body.position = (float(pose[0]), float(pose[1]), 0.0)
-        self._body.wxyz = about_z(pose[2:])[0]
+        """Draw what is in the sensor frame at T_world_sensor (3,) from now on."""
+        self._pose = pose
 
     def visible(self, name: str, visible: bool) -> None:
         """Show or hide a layer as it is."""
@@ -92,13 +97,13 @@ class Canvas:
         self.visible(name, visible and len(strokes) > 0)
         if visible and len(strokes):
             each = np.broadcast_to(untoned(colours).reshape(-1, 1, 3), (len(strokes), 2, 3))
-            self._set(name, points=lift(strokes), colors=each)
+            self._set(name, points=lift(self._in_world(name, strokes)), colors=each)
 
     def points(self, name: str, visible: bool, xy: Array, colours: Rgbs) -> None:
         """Show points (N, 2) in one colour (3,) or in (N, 3)."""
         self.visible(name, visible and len(xy) > 0)
         if visible and len(xy):
-            self._set(name, points=lift(xy), colors=colours)
+            self._set(name, points=lift(self._in_world(name, xy)), colors=colours)
 
     def discs(self, name: str, visible: bool, xy: Array, half: Array, angle: Array, colours: Rgbs) -> None:
         """Show ellipses (C, 2) with half axes (C, 2) turned by angles (C,), in colours (C, 3)."""
@@ -109,11 +114,14 @@ class Canvas:
             self._set(name, batched_colors=np.zeros(3, np.uint8))
             self._set(
                 name,
-                batched_positions=lift(xy),
-                batched_wxyzs=about_z(angle),
+                batched_positions=lift(self._in_world(name, xy)),
+                batched_wxyzs=about_z(angle + (self._pose[2] if name in BODY else 0.0)),
                 batched_scales=lift(half, 1.0),
                 batched_colors=untoned(colours),
             )
+
+    def _in_world(self, name: str, xy: Array) -> Array:
+        return in_world(self._pose, xy) if name in BODY else xy
 
     def on_click(self, name: str, clicked: Callable[[Any], None]) -> None:
         """Tell of clicks on the discs of a layer."""

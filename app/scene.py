@@ -10,7 +10,7 @@ from app.colours import Rgbs, categorical, method_rgb, turbo
 from app.frame import Frame
 from app.inks import ink
 from app.picking import Picking
-from app.scene_map import MapLayers
+from app.scene_map import MapLayers, pose_of
 from app.shapes import (
     ARROW,
     CIRCLE,
@@ -46,6 +46,7 @@ class Scene:
         """Show the frame."""
         with self._server.atomic():
             self._prepare(frame)
+            self._canvas.place(pose_of(frame))
             for draw in (
                 self._draw_scan,
                 self._draw_gaps,
@@ -75,13 +76,13 @@ class Scene:
         step = nice_step(self._reach)
         self._canvas.paper(theme == "dark", self._ink("cell"), self._ink("section"), float(step))
         self._canvas.strokes("labels", True, axis_labels(self._reach, step), self._ink("label"))
-        self._canvas.strokes("sensor", True, ARROW * self._reach / 40, self._ink("sensor"))
 
     def _draw_scan(self, frame: Frame) -> None:
         layers, scan = frame.settings.view.layers, frame.scan
         self._canvas.points("points", layers.points, scan.xy[scan.valid], self._point_colours(frame))
-        for name, visible in (("grid", layers.grid), ("labels", layers.grid), ("sensor", layers.sensor)):
-            self._canvas.visible(name, visible)
+        self._canvas.strokes("sensor", layers.sensor, ARROW * self._reach / 40, self._ink("sensor"))
+        for name in ("grid", "labels"):
+            self._canvas.visible(name, layers.grid)
 
     def _draw_gaps(self, frame: Frame) -> None:
         """The sectors whose data were lost on the way, as wedges."""

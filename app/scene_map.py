@@ -10,7 +10,7 @@ from app.colours import Rgbs
 from app.frame import Frame
 from app.navigation import Where
 from app.settings import Layers
-from app.shapes import CIRCLE, Array, ellipses, polylines, text
+from app.shapes import CIRCLE, Array, ellipses, in_world, polylines, text
 from app.trails import Paths
 from lidarcore.localization import Landmarks
 
@@ -30,8 +30,7 @@ class MapLayers:
         self._looks: dict[str, tuple[object, ...]] = {}
 
     def draw(self, frame: Frame, reach: float) -> None:
-        """Show where the sensor is; without an estimate it is at the origin, and the rest is hidden."""
-        self._canvas.place(pose_of(frame))
+        """Show where the sensor is; without an estimate there is nothing to show."""
         layers, scale = frame.settings.view.layers, frame.settings.view.ellipse_scale
         self._draw_pose(frame.where, layers, scale)
         self._draw_trails(frame.paths, layers)
@@ -62,7 +61,7 @@ class MapLayers:
         strokes, colours = [NOTHING], [np.empty((0, 3), np.uint8)]
         if where is not None:
             found = where.whereabouts
-            seen = _in_world(found.estimate.pose, found.observed.xy)
+            seen = in_world(found.estimate.pose, found.observed.xy)
             for pairs, ink in ((found.pairs, "association"), (found.ambiguous, "ambiguous")):
                 place = {id_: at for at, id_ in enumerate(found.landmarks.ids.tolist())}
                 rows = [(i, place[id_]) for i, id_ in pairs.tolist() if id_ in place]
@@ -127,10 +126,3 @@ class MapLayers:
 def pose_of(frame: Frame) -> Array:
     """T_world_sensor (3,) of a frame."""
     return AT_ORIGIN if frame.where is None else frame.where.whereabouts.estimate.pose
-
-
-def _in_world(pose: Array, points: Array) -> Array:
-    """Points (K, 2) m of the sensor frame in the world."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    turned: Array = points @ np.array([[c, s], [-s, c]])
-    return pose[:2] + turned

@@ -38,6 +38,13 @@ def lift(xy: Array, z: float = 0.0) -> NDArray[np.float32]:
     return np.concatenate([xy, np.full((*xy.shape[:-1], 1), z)], -1).astype(np.float32)
 
 
+def in_world(pose: Array, points: Array) -> Array:
+    """Points (..., 2) m of the sensor frame in the world, T_world_sensor (3,)."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    placed: Array = pose[:2] + points @ np.array([[c, s], [-s, c]])
+    return placed
+
+
 def polylines(points: Array) -> Array:
     """(C, P, 2) polylines as (C * (P - 1), 2, 2) separate strokes."""
     return np.stack([points[:, :-1], points[:, 1:]], 2).reshape(-1, 2, 2)

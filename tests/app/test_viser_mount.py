@@ -136,6 +136,25 @@ def test_layers_theme_and_selection_reach_the_scene(server: Server, room) -> Non
         assert "ThemeConfigurationMessage" in viewer.types
 
 
+def test_a_localized_sensor_and_what_it_sees_are_drawn_where_it_is(server: Server, room) -> None:
+    server.change("PATCH", "/settings", {"navigation": {"mode": "slam"}})
+    server.play(room, paused=True)
+    server.change(
+        "POST",
+        "/pose",
+        {"x": 10, "y": -5, "heading": np.pi / 2, "sigma_position": 1e-3, "sigma_heading": 1e-3},
+    )
+    with viewing(server) as viewer:
+        viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
+        server.change("POST", "/source/step", {"by": 1})
+        viewer.until(lambda: viewer.array("/body/sensor", "points").reshape(-1, 3)[:, 0].min() > 8)
+        x, y = np.array(server.get("/frame", points=True)["points"]).T
+        pose = server.get("/pose")
+        assert (pose["x"], pose["y"], pose["heading"]) == pytest.approx((10, -5, np.pi / 2), abs=0.02)
+        shown = viewer.array("/body/points", "points").reshape(-1, 3)[:, :2]
+        np.testing.assert_allclose(shown, np.stack([10 - y, -5 + x], -1), atol=0.15)
+
+
 def test_a_click_selects_the_nearest_corner(server: Server, room) -> None:
     frame = server.play(room, paused=True)
     with server.stream() as stream, viewing(server) as viewer:
