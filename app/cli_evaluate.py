@@ -5,22 +5,20 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from app.cli_options import RecordingPath, Set, SettingsFile, Topic, settings_from
 
 if TYPE_CHECKING:
     from lidarcore import SensorNoise
 
 WIDTH = 160  # of the tables in a file or a pipe
 
-evaluate = typer.Typer(help="Measure against simulated truth what each method claims.", no_args_is_help=True)
-
-
-@evaluate.callback()
-def _evaluations() -> None:
-    """Keeps the name of the evaluation a part of the command while there is only one."""
+evaluate = typer.Typer(help="What each method claims, and what is so.", no_args_is_help=True)
 
 
 @evaluate.command()
@@ -95,6 +93,47 @@ def consistency(
     )
     if output is not None:
         consistency_tables.write(study, output)
+
+
+@evaluate.command()
+def repeatability(
+    recording: RecordingPath,
+    scans: Annotated[int, typer.Option(min=10, help="in the window; as many are read")] = 100,
+    skip: Annotated[int, typer.Option(min=0, help="scans to leave out at the beginning")] = 0,
+    methods: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="fitters to compare; all if not given")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="FILE.json with every corner, or FILE.csv")
+    ] = None,
+    topic: Topic = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+) -> None:
+    """The scatter of corners against the ellipse each method claims, while the sensor stood still."""
+    from rich.console import Console
+
+    from app.repeatability_table import table
+    from lidarcore import FITTERS, compare, open_recording
+    from lidarcore.evaluation import consistency_tables, repeatability_tables
+    from lidarcore.evaluation.repeatability import Repeatability
+
+    if output is not None:
+        consistency_tables.check(output)
+        _check_folder(output)
+    extraction = settings_from(settings, set_).extraction
+    study = Repeatability(scans, [name.strip() for name in methods.split(",")] if methods else FITTERS)
+    for scan in islice(open_recording(recording, topic), skip, skip + scans):
+        study.add(compare(scan, extraction, study.methods))
+    summary = study.summary()
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    console.print(table(summary))
+    if summary.message is not None:
+        console.print(summary.message)
+    if output is not None:
+        repeatability_tables.write(summary, output)
 
 
 def _check_folder(file: Path) -> None:

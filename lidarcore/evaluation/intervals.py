@@ -57,9 +57,15 @@ def share(hits: Array, trials: Array) -> Interval:
     variance = _standard_error(hits, trials, p) ** 2 if len(hits) > 1 else 0.0
     if variance > 0:
         n = min(n, p * (1 - p) / variance)
+    low, high = wilson(np.array(p), np.array(n))
+    return Interval(p, float(low), float(high))
+
+
+def wilson(p: Array, n: Array) -> tuple[Array, Array]:
+    """Ends of Wilson's intervals of shares p of n > 0 independent trials."""
     middle = (p + _Z**2 / (2 * n)) / (1 + _Z**2 / n)
-    half = _Z / (1 + _Z**2 / n) * float(np.sqrt(p * (1 - p) / n + _Z**2 / (4 * n * n)))
-    return Interval(p, max(middle - half, 0.0), min(middle + half, 1.0))
+    half = _Z / (1 + _Z**2 / n) * np.sqrt(p * (1 - p) / n + _Z**2 / (4 * n * n))
+    return np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
 
 
 def _standard_error(numerators: Array, denominators: Array, value: float) -> float:

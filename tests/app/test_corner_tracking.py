@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from serving import room_ranges
 
-from app.tracking import GATE, MEMORY, Tracker, match
 from lidarcore import ExtractionSettings, Scan, compare
+from lidarcore.tracking import GATE, MEMORY, Tracker, match
 
 
 def found(xy: list[tuple[float, float]]) -> dict:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarcore import Features
+from lidarcore.features import Features
 
 GATE = 0.3  # m: a corner found farther away than this is another one
-MEMORY = 10  # frames a corner may be missing and still keep its id
+MEMORY = 10  # frames a corner may be missing and still keep its id, if not told otherwise
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,15 @@ def match(features: Mapping[str, Features]) -> list[dict[str, int]]:
 
 @dataclass
 class Tracker:
-    """Gives every corner an id that it keeps while it stays within GATE of where it last was."""
+    """Gives every corner an id that it keeps while it stays within GATE of where it last was.
 
+    memory   frames a corner may be missing and still keep its id
+    follow   share of the way to a new sighting that its known place goes: all of it, or less where nothing moves, so
+             that one gross error does not make two corners of one
+    """
+
+    memory: int = MEMORY
+    follow: float = 1.0
     _seen: dict[int, tuple[NDArray[np.float64], int]] = field(default_factory=dict)
     _frame: int = 0
     _next_id: int = 1
@@ -58,12 +65,13 @@ class Tracker:
 
     def _identify(self, xy: NDArray[np.float64]) -> list[int]:
         self._frame += 1
-        self._seen = {i: seen for i, seen in self._seen.items() if self._frame - seen[1] <= MEMORY}
+        self._seen = {i: seen for i, seen in self._seen.items() if self._frame - seen[1] <= self.memory}
         ids = self._nearest(xy)
         for row, at in enumerate(xy):
             if ids[row] == 0:
                 ids[row], self._next_id = self._next_id, self._next_id + 1
-            self._seen[ids[row]] = (at, self._frame)
+            known, _ = self._seen.get(ids[row], (at, 0))
+            self._seen[ids[row]] = (known + self.follow * (at - known), self._frame)
         return ids
 
     def _nearest(self, xy: NDArray[np.float64]) -> list[int]:

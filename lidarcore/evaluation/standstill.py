@@ -1,0 +1,47 @@
+"""Does the sensor stand still? Seen from its corners alone, whatever their covariances claim."""
+
+import numpy as np
+
+from lidarcore.evaluation.scatter import LEAST, Sightings
+from lidarcore.scan import Array, Ints
+
+RECENT = 3  # scans in which nearly all corners must be new ones for a leap
+_NEW = 0.75
+_SIGMAS = 6.0
+
+
+def moves(corners: Sightings, xy: Array, newest: int) -> bool:
+    """Whether corners at xy (R, 2) m tell of a sensor that moves; `newest` is the number of the last scan."""
+    return _leapt(corners, newest) or _drifts(corners, xy)
+
+
+def _leapt(corners: Sightings, newest: int) -> bool:
+    """Nearly all corners of the last scans were never seen before. Corners that are hidden do not count."""
+    if newest < LEAST:
+        return False
+    first = corners.scans[corners.starts]
+    last = corners.scans[np.append(corners.starts[1:], len(corners.ids)) - 1] if len(first) else first
+    recent = last > newest - RECENT
+    new = recent & (first > newest - RECENT)
+    return bool(recent.sum() >= RECENT and new.sum() > _NEW * recent.sum())
+
+
+def _drifts(corners: Sightings, xy: Array) -> bool:
+    """Most corners lie elsewhere in their last third of sightings than in the first: by _SIGMAS standard errors.
+
+    The noise is taken from successive differences, which a slow drift hardly enters. Real sensors' errors are
+    correlated from scan to scan (0.3 in real recordings), so the limit is wider than chance alone would ask for.
+    """
+    starts = corners.starts
+    n = np.diff(starts, append=len(corners.ids))
+    often: Ints = np.flatnonzero(n >= LEAST)
+    if not len(often):
+        return False
+    third, rank = np.repeat(n // 3, n), np.arange(len(xy)) - np.repeat(starts, n)
+    side = np.where(rank < third, -1.0, np.where(rank >= np.repeat(n, n) - third, 1.0, 0.0))
+    steps = np.diff(xy, axis=0, prepend=xy[:1])
+    steps[starts] = 0.0
+    shift = np.add.reduceat(side[:, None] * xy, starts, axis=0)[often] / (n // 3)[often, None]
+    variance = np.add.reduceat((steps**2).sum(1), starts)[often] / (2 * (n[often] - 1))
+    drifts = (shift**2).sum(1) > _SIGMAS**2 * variance * 2 / (n[often] // 3)
+    return bool(2 * drifts.sum() > len(often))
