@@ -14,7 +14,6 @@ from app.navigation import Where
 from app.selection import Selection
 from app.settings import Settings
 from app.taken import Taken
-from app.tracking import CornerRow
 from app.trails import NO_PATHS, Paths
 from app.wire import (
     CornerJson,
@@ -27,6 +26,7 @@ from app.wire import (
 from lidarcore import Features, Scan
 from lidarcore.clusters import Clusters
 from lidarcore.scan import Array
+from lidarcore.tracking import CornerRow
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from typing import BinaryIO
 from typing_extensions import TypedDict
 
 from app.map_writer import MapChange, MapWriter
-from lidarcore.errors import LidarError, UnknownLandmarkError, UnknownSessionError
+from lidarcore.errors import LidarError, MapFileError, UnknownLandmarkError, UnknownSessionError
 from lidarcore.landmarks import Atlas, LandmarkMap, Session, read_landmarks
 from lidarcore.localization import Landmarks, from_stored
 
@@ -85,6 +85,7 @@ class LandmarkStore:
         self._run: LandmarkRun | None = None
         self._used: int | None = None
         self._waiting: dict[LandmarkRun, _Waiting] = {}
+        self._writing: _Waiting | None = None
         self._news = threading.Condition()
         self._closing = threading.Event()
         self._thread = threading.Thread(target=self._work, name="landmarks", daemon=True)
@@ -102,7 +103,9 @@ class LandmarkStore:
     @property
     def status(self) -> LandmarkStoreJson:
         """How well the map gets to the disk."""
-        run, waiting = self._run, list(self._waiting.values())
+        with self._news:
+            waiting = [*self._waiting.values(), *([self._writing] if self._writing else [])]
+        run = self._run
         return {
             "path": str(self.atlas.path),
             "session": self.session,
@@ -141,9 +144,14 @@ class LandmarkStore:
         return from_stored(self.atlas[session])
 
     def load(self, file: BinaryIO, format: str, name: str) -> Session:
-        """A file of a map (one of FORMATS) as a session of its own. Raises MapFileError; nothing is kept of it then."""
+        """A file of a map (one of FORMATS) as a session of its own. Raises MapFileError; nothing is kept of it then.
+
+        So also for a file without landmarks: as the newest map it would be the one that is asked.
+        """
         text = io.TextIOWrapper(file, "utf-8-sig", newline="")
         found = [replace(landmark, id=None) for landmark in read_landmarks(text, format)]
+        if not found:
+            raise MapFileError(f"This {format} holds no landmarks: export a map that has some.")
         now = time.time()
         session = self.atlas.begin(name, now, "import", found).session
         self.atlas.end(session, now)
@@ -161,8 +169,8 @@ class LandmarkStore:
     def _schedule(self, run: LandmarkRun, newest: _Waiting) -> None:
         """Have the newest map of a run written in its turn."""
         with self._news:
-            self._waiting.pop(run, None)
-            self._waiting[run] = newest
+            before = self._waiting.pop(run, newest)
+            self._waiting[run] = replace(newest, since=before.since)
             while len(self._waiting) > MOST_RUNS:
                 del self._waiting[next(iter(self._waiting))]
             self._news.notify()
@@ -174,9 +182,10 @@ class LandmarkStore:
                 if not self._waiting:
                     return
                 run = next(iter(self._waiting))
-                waiting = self._waiting.pop(run)
+                self._writing = waiting = self._waiting.pop(run)
             is_last = self._closing.is_set()
             pause = self._attempt(run, waiting)
+            self._writing = None
             if is_last and self.error:
                 return
             self._closing.wait(pause)
@@ -207,6 +216,6 @@ class LandmarkStore:
         is_deleted = isinstance(error, UnknownLandmarkError | UnknownSessionError)
         if not (is_deleted and waiting.ended):
             with self._news:
-                self._waiting.setdefault(run, waiting)
+                self._waiting[run] = replace(self._waiting.get(run, waiting), since=waiting.since)
         self.error = None if is_deleted else str(error)
         return PAUSE if is_deleted else RETRY

@@ -15,10 +15,13 @@ from app.trails import NO_PATHS, Paths, Row, Trails
 from lidarcore import Features, Scan
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LandmarkMapError, LocalizationError
-from lidarcore.localization import NavigationSettings, Navigator, Whereabouts
+from lidarcore.localization import NavigationSettings, Navigator, Whereabouts, deskew
+from lidarcore.localization.estimate import as_pose
+from lidarcore.localization.points import check_covariance
+from lidarcore.localization.reckoning import Velocity
 from lidarcore.scan import Array
 
-REMEMBERED = 600  # scans whose whereabouts are shown again when they are
+REMEMBERED = 3000  # scans whose whereabouts are shown again when they are
 
 NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
 
@@ -32,12 +35,14 @@ class Where:
     """What the navigator says after a scan.
 
     stored  ids in the file of landmarks by their ids in `whereabouts`; in a known map they are the same
+    motion  what was taken out of the scan by deskewing: m/s ahead, rad/s, m/s to the left
     """
 
     whereabouts: Whereabouts
     session: int | None
     stored: Mapping[int, int]
     truth: Array | None
+    motion: Velocity | None
 
 
 @dataclass(slots=True, eq=False)
@@ -65,21 +70,37 @@ class Run:
         """Whether the scan is the next of this run, or one that it has seen."""
         index = taken.position["index"]
         same = (self.source, self.settings) == (taken.source, settings)
-        return same and (index > self.newest or index in self.shown)
+        return same and (index > self.newest or self.recall(index) is not None)
+
+    def recall(self, index: int) -> Where | None:
+        """What there was to say of a scan that was seen, or when it was passed over."""
+        if index > self.newest:
+            return None
+        return self.shown.get(index) or next(
+            (self.shown[known] for known in reversed(self.shown) if known < index), None
+        )
+
+    def deskewed(self, index: int, scan: Scan) -> Scan:
+        """As the navigator would have it, or had it."""
+        where = self.recall(index)
+        if where is None:
+            return self.navigator.deskewed(scan)
+        return scan if where.motion is None else deskew(scan, *where.motion)
 
     def step(
         self, index: int, scan: Scan, features: Features, clusters: Clusters | None, method: str
     ) -> Where:
         """Go on by a scan; one that was seen already is shown as it was then."""
-        if index in self.shown:
-            return self.shown[index]
+        if (seen := self.recall(index)) is not None:
+            return seen
         found = self.navigator.step(scan, features, clusters)
         truth = self.trails.add(found, scan.truth)
         if self.written:
             self.written.put(found.landmarks, method)
         ids = found.landmarks.ids.tolist()
         stored = self.written.writer.ids if self.written else dict(zip(ids, ids, strict=True))
-        where = Where(found, self.session, stored, truth)
+        stamp, velocity = self.navigator.deskewed_by
+        where = Where(found, self.session, stored, truth, velocity if stamp == scan.stamp else None)
         self.newest = max(self.newest, index)
         self.shown[index] = where
         if len(self.shown) > REMEMBERED:
@@ -96,6 +117,7 @@ class Navigation:
         self._store = store
         self._map: int | None = None
         self._run: Run | None = None
+        self._placed: tuple[Array, ArrayLike] | None = None
         self._lock = threading.RLock()
 
     @property
@@ -133,23 +155,32 @@ class Navigation:
     def reset(self) -> None:
         """Begin again: SLAM with an empty map, localization from nothing."""
         with self._lock:
-            self._run = None
+            self._run = self._placed = None
             self.odometry.clear()
 
-    def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
-        """The sensor is here, says someone: (3,) m, m, rad and (3, 3). Raises LocalizationError."""
+    def place(self, pose: ArrayLike, covariance: ArrayLike, mode: str) -> None:
+        """The sensor is here, says someone: (3,) m, m, rad and (3, 3). Raises LocalizationError.
+
+        Between two runs it is where the next one begins.
+        """
+        if mode == "off" or self.problem:
+            raise NotNavigatingError(
+                self.problem or "Nothing is localized: set navigation.mode to slam or localize."
+            )
+        checked = as_pose(pose, "pose")
+        check_covariance(covariance, "The pose's covariance")
         with self._lock:
             if self._run is None:
-                raise NotNavigatingError(
-                    self.problem or "Nothing is localized: set navigation.mode to slam or localize."
-                )
-            self._run.navigator.place(pose, covariance)
+                self._placed = checked, covariance
+            else:
+                self._run.navigator.place(checked, covariance)
 
     def deskewed(self, taken: Taken, settings: Settings) -> Scan:
         """The scan as if the sensor had stood, as far as its motion is known, with the odometry there is."""
         with self._lock:
             run = self._of(taken, settings.navigation)
-            return run.navigator.deskewed(self._with_odometry(taken.scan)) if run else taken.scan
+            scan = self._with_odometry(taken.scan)
+            return run.deskewed(taken.position["index"], scan) if run else scan
 
     def step(
         self, taken: Taken, scan: Scan, features: Features, clusters: Clusters | None, method: str
@@ -178,6 +209,9 @@ class Navigation:
             self._run = self._localizing(taken, wanted)
         else:
             self._store.use(None)
+        if self._run and self._placed:
+            self._run.navigator.place(*self._placed)
+            self._placed = None
         return self._run
 
     def _localizing(self, taken: Taken, wanted: NavigationSettings) -> Run | None:

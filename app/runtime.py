@@ -17,10 +17,10 @@ from app.selection import Selection
 from app.settings import Settings
 from app.sources import Source
 from app.taken import Taken
-from app.tracking import Tracker
 from app.wire import LocalizationStateJson
 from lidarcore import Features, Scan, extract, localization, warm_up
 from lidarcore.clusters import cluster
+from lidarcore.tracking import Tracker
 
 logger = logging.getLogger(__name__)
 
@@ -132,7 +132,16 @@ class Runtime:
             "session": self.navigation.session,
             "map": self.navigation.map,
             "problem": self.navigation.problem,
+            "odometry": self.navigation.odometry.state(self._why_not_fed()),
         }
+
+    def _why_not_fed(self) -> str | None:
+        """Why the newest scan takes no odometry from outside, if so."""
+        if self.settings.navigation.mode == "off":
+            return "Nothing is localized: set navigation.mode to slam or localize."
+        if self.frame and self.frame.taken.scan.odometry is not None:
+            return "The source has odometry of its own."
+        return None
 
     def feed(self, pose: OdometryPose) -> None:
         """Odometry from outside. Raises MotionError if the clock went back or the pose jumped."""

@@ -139,6 +139,19 @@ class LocalizationJson(TypedDict):
     nis_band: Pair
 
 
+class OdometryStateJson(TypedDict):
+    """Odometry sent from outside: poses taken and refused since the last reset, and the newest stamp taken, s.
+
+    `used` tells whether the newest scan was given some; if not, `problem` says why, unless none was sent.
+    """
+
+    taken: int
+    refused: int
+    stamp: float | None
+    used: bool
+    problem: str | None
+
+
 class LocalizationStateJson(TypedDict):
     """`session` is built or localized in; `map` was chosen to localize in, null for the newest with landmarks."""
 
@@ -146,6 +159,7 @@ class LocalizationStateJson(TypedDict):
     session: int | None
     map: int | None
     problem: str | None
+    odometry: OdometryStateJson
 
 
 class TimingsJson(TypedDict):

@@ -5,6 +5,7 @@ import math
 from typing import Annotated, Any, Literal
 
 from fastapi import APIRouter, Depends, Query, Request
+from pydantic import Field
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
@@ -14,6 +15,7 @@ from app.landmark_store import LandmarkStore
 from app.problems import ProblemError, documented, encode
 from lidarcore.errors import UnknownLandmarkError
 from lidarcore.landmarks import Box, Circle, Filter, Landmark, LandmarkMap, Metric, write_landmarks
+from lidarcore.landmarks.landmark import MAX_COORDINATE, MAX_ID
 
 MEDIA_TYPES = {"json": "application/json", "csv": "text/csv", "geojson": "application/geo+json"}
 MOST, USUAL = 1000, 100  # landmarks of a page
@@ -66,7 +68,8 @@ PAGE = {"session": 3, "landmarks": [LANDMARK], "next": 41}
 NEIGHBOURS = {"session": 3, "neighbours": [{"distance": 0.412, "landmark": LANDMARK}]}
 HISTORY = {"session": 3, "landmark": LANDMARK, "history": [LANDMARK], "next": None}
 
-Metres = Annotated[float | None, Query(allow_inf_nan=False, description="m")]
+Metres = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 SessionId = Annotated[
@@ -86,8 +89,8 @@ async def _region(
     bbox: Annotated[
         str | None, Query(description="min_x,min_y,max_x,max_y in m", examples=["-2.5,-2,4,2.5"])
     ] = None,
-    x: Metres = None,
-    y: Metres = None,
+    x: Annotated[Metres | None, Query(description="m")] = None,
+    y: Annotated[Metres | None, Query(description="m")] = None,
     radius: Annotated[float | None, Query(ge=0, allow_inf_nan=False, description="m about x, y")] = None,
 ) -> Box | Circle | None:
     """A box or a circle. Raises ProblemError 422 if it is neither."""
@@ -101,17 +104,26 @@ async def _region(
         x_min, y_min, x_max, y_max = map(float, bbox.split(","))
     except ValueError as error:
         raise ProblemError(422, f"bbox is {bbox!r}: give min_x,min_y,max_x,max_y in metres.") from error
+    if not (x_min <= x_max and y_min <= y_max):
+        raise ProblemError(
+            422, f"bbox is {bbox!r}: give min_x,min_y,max_x,max_y, no minimum above its maximum."
+        )
     return Box(x_min, y_min, x_max, y_max)
 
 
 async def _filter(
     kind: Annotated[list[str], Query(description="corner, post, ...; may be repeated")] = [],  # noqa: B006
     method: Annotated[list[str], Query(description="what found it; may be repeated")] = [],  # noqa: B006
-    since: Annotated[float, Query(description="s: seen then or later")] = -math.inf,
-    until: Annotated[float, Query(description="s: seen then or before")] = math.inf,
-    min_count: Annotated[int, Query(description="seen at least so often")] = 1,
-    max_sigma: Annotated[float, Query(description="m, along the longest axis of the ellipse")] = math.inf,
+    since: Annotated[Finite, Query(description="s: seen then or later")] = -math.inf,
+    until: Annotated[Finite, Query(description="s: seen then or before")] = math.inf,
+    min_count: Annotated[int, Query(ge=0, le=MAX_ID, description="seen at least so often")] = 1,
+    max_sigma: Annotated[
+        Finite, Query(ge=0, description="m, along the longest axis of the ellipse")
+    ] = math.inf,
 ) -> Filter:
+    """Which landmarks count. Raises ProblemError 422 if since is after until."""
+    if since > until:
+        raise ProblemError(422, f"since is {since:.15g} s, after until, {until:.15g} s: exchange them.")
     return Filter(
         kinds=tuple(kind),
         methods=tuple(method),
@@ -143,7 +155,7 @@ def find(
     region: Region,
     which: Which,
     limit: Limit = USUAL,
-    after: Annotated[int, Query(ge=0, le=2**63 - 1, description="`next` of the page before")] = 0,
+    after: Annotated[int, Query(ge=0, le=MAX_ID, description="`next` of the page before")] = 0,
     session: SessionId = None,
     format: Annotated[Literal["json", "csv", "geojson"], Query(description="of the answer")] = "json",
 ) -> Response:
@@ -166,13 +178,13 @@ def find(
 def nearest(
     landmarks: CurrentLandmarks,
     which: Which,
-    x: Annotated[float, Query(allow_inf_nan=False, description="m", examples=[1.0])],
-    y: Annotated[float, Query(allow_inf_nan=False, description="m", examples=[0.5])],
+    x: Annotated[Metres, Query(description="m", examples=[1.0])],
+    y: Annotated[Metres, Query(description="m", examples=[0.5])],
     k: Annotated[int, Query(ge=1, le=MOST, description="how many")] = 1,
     metric: Annotated[
         Metric, Query(description="m, or in standard deviations of landmark and point")
     ] = "euclidean",
-    within: Annotated[float, Query(ge=0, description="largest distance")] = math.inf,
+    within: Annotated[Finite, Query(ge=0, description="largest distance")] = math.inf,
     sigma: Annotated[
         float, Query(ge=0, le=1e6, description="m, of the point, in each direction, for mahalanobis")
     ] = 0.0,
@@ -189,7 +201,7 @@ def nearest(
 def read(
     landmarks: CurrentLandmarks,
     id: int,
-    after: Annotated[float, Query(description="s: `next` of the page before")] = -math.inf,
+    after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
     limit: Limit = USUAL,
 ) -> Response:
     """One landmark, and what it was in each second in which it was seen, the oldest first; also if it was removed."""

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from fastapi import APIRouter, Body, Query
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, WithJsonSchema
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
@@ -12,7 +12,7 @@ from app.api.dependencies import CurrentRuntime
 from app.api.examples import ok
 from app.located import pose_json
 from app.navigation import Navigation, NotNavigatingError
-from app.odometry_feed import OdometryPose
+from app.odometry_feed import Coordinate, Finite, OdometryPose
 from app.problems import ProblemError, documented, encode
 from app.runtime import Runtime
 from app.tables import csv_text
@@ -32,10 +32,11 @@ ROW = {
     "stamp": 1795255000.1, "x": 1.204, "y": -0.311, "heading": 0.52,
     "sigma_x": 0.004, "sigma_y": 0.005, "sigma_heading": 0.002,
 }  # fmt: skip
-STATE = {"mode": "slam", "session": 3, "map": None, "problem": None}
+FED = {"taken": 1204, "refused": 0, "stamp": 1795255000.1, "used": True, "problem": None}
+STATE = {"mode": "slam", "session": 3, "map": None, "problem": None, "odometry": FED}
 ODOMETRY = {"stamp": 1795255000.1, "x": 1.2, "y": -0.3, "heading": 0.5}
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+ONE = OdometryPose.model_json_schema()
+ONE_OR_SOME = {"anyOf": [ONE, {"type": "array", "items": ONE}], "examples": [ODOMETRY]}
 
 
 class WhereJson(TypedDict):
@@ -74,8 +75,8 @@ class _Body(BaseModel):
 class InitialPose(_Body):
     """T_world_sensor, with its covariance or the standard deviations of position and heading."""
 
-    x: Annotated[Finite, Field(description="m")]
-    y: Annotated[Finite, Field(description="m")]
+    x: Coordinate
+    y: Coordinate
     heading: Annotated[Finite, Field(description="rad")]
     covariance: Matrix3 | None = Field(None, description="of x, y, heading: m², m rad, rad²")
     sigma_position: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False, description="m")] = (
@@ -147,7 +148,8 @@ def place(
     variances = [pose.sigma_position**2, pose.sigma_position**2, pose.sigma_heading**2]
     covariance = np.diag(variances) if pose.covariance is None else np.array(pose.covariance)
     try:
-        runtime.navigate(lambda navigation: navigation.place((pose.x, pose.y, pose.heading), covariance))
+        mode, at = runtime.settings.navigation.mode, (pose.x, pose.y, pose.heading)
+        runtime.navigate(lambda navigation: navigation.place(at, covariance, mode))
     except NotNavigatingError as error:
         raise ProblemError(409, str(error)) from error
     return runtime.localization()
@@ -174,14 +176,23 @@ def trajectory(
 
 @router.post("/odometry", status_code=204)
 def odometry(
-    runtime: CurrentRuntime, poses: Annotated[OdometryPose | list[OdometryPose], Body(examples=[ODOMETRY])]
+    runtime: CurrentRuntime,
+    poses: Annotated[Any, WithJsonSchema(ONE_OR_SOME), Body()],
 ) -> None:
     """Feed T_odom_sensor, one pose or some in their order; stamps are Unix seconds, as those of the scans.
 
     Refused, and left out, if the clock went back or the pose jumped: what came before it in a list is taken.
+    GET /localization tells what became of it.
     """
-    for pose in poses if isinstance(poses, list) else [poses]:
+    for pose in _poses(poses):
         runtime.feed(pose)
+
+
+def _poses(body: Any) -> list[OdometryPose]:
+    """One or some; a union of both would complain about both. Raises pydantic.ValidationError."""
+    if isinstance(body, list):
+        return TypeAdapter(list[OdometryPose]).validate_python(body)
+    return [OdometryPose.model_validate(body)]
 
 
 def _why(runtime: Runtime) -> str:

@@ -83,6 +83,8 @@ async def upload(
     ] = "a file",
 ) -> SessionJson:
     """Load a map: the body is a file as GET gives it. It becomes a session of its own if all of it makes sense."""
+    if not name.isprintable():
+        raise ProblemError(422, f"name is {name!r}: give printable text.")
     file = io.BytesIO()
     async for chunk in request.stream():
         if file.tell() + len(chunk) > MAX_BYTES:

@@ -90,7 +90,11 @@ def _read_csv(file: TextIO) -> Iterator[Row]:
     names = {csv_name: name for name, csv_name in _CSV_NAMES.items()}
     if unknown := [name for name in header or [""] if name not in names]:
         raise MapFileError(f"Columns {unknown} are none of {list(names)}: name and convert them so.")
-    for values in reader:
+    for values in filter(None, reader):  # without blank lines
+        if len(values) != len(header):
+            raise MapFileError(
+                f"Line {reader.line_num} has {len(values)} values, the header {len(header)} columns: make them equal."
+            )
         texts = dict(zip((names[name] for name in header), values, strict=True))
         yield {
             name: _CSV_TYPES.get(name, str)(text) for name, text in texts.items() if text or name == "method"
@@ -110,14 +114,19 @@ def _write_geojson(rows: Iterable[Row], file: TextIO) -> None:
 
 
 def _read_geojson(file: TextIO) -> Iterator[Row]:
-    for feature in _items(file, "features"):
-        try:
-            x, y = feature["geometry"]["coordinates"]
-            yield {"x": x, "y": y, **feature["properties"]} | (
-                {"id": feature["id"]} if "id" in feature else {}
+    for number, feature in enumerate(_items(file, "features"), 1):
+        match feature:
+            case {"geometry": {"type": "Point", "coordinates": [x, y, *_]}, "properties": dict(properties)}:
+                pass
+            case _:
+                raise MapFileError(
+                    f"Landmark {number} is no Point of two coordinates with properties: {json.dumps(feature)[:200]}"
+                )
+        if twice := {"x", "y"} & properties.keys():
+            raise MapFileError(
+                f"Landmark {number} has {', '.join(sorted(twice))} among its properties: leave it to the coordinates."
             )
-        except (KeyError, TypeError) as error:
-            raise MapFileError(f"This is no Point with properties: {json.dumps(feature)[:200]}") from error
+        yield properties | {"x": x, "y": y} | ({"id": feature["id"]} if "id" in feature else {})
 
 
 def _feature(row: Row) -> Row:

@@ -11,6 +11,7 @@ from lidarcore.errors import LandmarkError
 from lidarcore.scan import Array
 
 MAX_COORDINATE = 1e7  # m; farther than across a continent is surely another unit
+MAX_TIME = 1e12  # s; that many are surely another unit
 MAX_ID = 2**63 - 1
 _SINGULAR = 1e-12  # 1 - correlation² of a covariance that rounding cannot tell from a singular one
 
@@ -27,7 +28,7 @@ class Landmark:
     id                    given by the map; None for one that is not in a map yet
 
     Raises LandmarkError if a number is not finite, the covariance is not positive definite, first_seen is after
-    last_seen, or a position is beyond 10,000 km.
+    last_seen, a position is beyond 10,000 km or a time beyond 1e12 s.
     """
 
     x: float
@@ -80,6 +81,8 @@ class Landmark:
         if max(abs(self.x), abs(self.y)) > MAX_COORDINATE:
             raise LandmarkError(f"The position ({self.x:g}, {self.y:g}) is too far away: give metres.")
         check_covariance(self.var_x, self.cov_xy, self.var_y)
+        if max(abs(self.first_seen), abs(self.last_seen)) > MAX_TIME:
+            raise LandmarkError(f"Seen {self.first_seen:g} to {self.last_seen:g} s is no time: give seconds.")
         if self.first_seen > self.last_seen:
             raise LandmarkError(
                 f"first_seen {self.first_seen} s is after last_seen {self.last_seen} s: exchange them."

@@ -188,9 +188,9 @@ def test_a_landmark_tells_its_history_also_when_it_was_removed(maps: Maps) -> No
 @pytest.mark.parametrize(
     ("path", "asked", "words"),
     [
-        ("", {"bbox": "1,0,0,1"}, "x_min = 1.0 is not below x_max"),
-        ("", {"bbox": "0,1,1,0"}, "y_min"),
-        ("", {"bbox": "nan,0,1,1"}, "x_min = nan"),
+        ("", {"bbox": "1,0,0,1"}, "no minimum above its maximum"),
+        ("", {"bbox": "0,1,1,0"}, "no minimum above its maximum"),
+        ("", {"bbox": "nan,0,1,1"}, "'nan,0,1,1'"),
         ("", {"bbox": "0,0,1"}, "min_x,min_y,max_x,max_y"),
         ("", {"bbox": "a,b,c,d"}, "min_x,min_y,max_x,max_y"),
         ("", {"x": 1, "y": 1}, "radius"),
@@ -198,11 +198,14 @@ def test_a_landmark_tells_its_history_also_when_it_was_removed(maps: Maps) -> No
         ("", {"x": "nan", "y": 1, "radius": 1}, "x"),
         ("", {"x": 1, "y": 1, "radius": -1}, "radius"),
         ("", {"x": 1, "y": 1, "radius": 1, "bbox": "0,0,1,1"}, "not both"),
-        ("", {"since": 2, "until": 1}, "seen_from = 2.0 is not below seen_to = 1.0"),
-        ("", {"since": "nan"}, "nan"),
-        ("", {"max_sigma": -1}, "max_sigma"),
-        ("", {"max_sigma": "nan"}, "max_sigma"),
+        ("", {"since": 2, "until": 1}, "since is 2 s, after until, 1 s"),
+        ("", {"since": "nan"}, "since: Input should be a finite"),
+        ("", {"until": "nan"}, "until: Input should be a finite"),
+        ("", {"x": 1e200, "y": 1, "radius": 1}, "/x: Input should be less"),
+        ("", {"max_sigma": -1}, "max_sigma: Input should be greater"),
+        ("", {"max_sigma": "nan"}, "max_sigma: Input should be a finite"),
         ("", {"min_count": 1.5}, "min_count"),
+        ("", {"min_count": 2**63}, "min_count"),
         ("", {"limit": 0}, "limit"),
         ("", {"limit": 1001}, "limit"),
         ("", {"after": -1}, "after"),
@@ -211,14 +214,16 @@ def test_a_landmark_tells_its_history_also_when_it_was_removed(maps: Maps) -> No
         ("", {"session": "one"}, "session"),
         ("/nearest", {"x": 1}, "y"),
         ("/nearest", {"x": 1, "y": "inf"}, "y"),
+        ("/nearest", {"x": 1e200, "y": 0}, "/x: Input should be less"),
+        ("/nearest", {"x": 0, "y": -2e7}, "/y: Input should be greater"),
         ("/nearest", {"x": 1, "y": 1, "k": 0}, "k"),
         ("/nearest", {"x": 1, "y": 1, "k": 1001}, "k"),
         ("/nearest", {"x": 1, "y": 1, "metric": "manhattan"}, "metric"),
         ("/nearest", {"x": 1, "y": 1, "sigma": 1}, "metric is 'euclidean'"),
-        ("/nearest", {"x": 1, "y": 1, "within": "nan"}, "within"),
+        ("/nearest", {"x": 1, "y": 1, "within": "nan"}, "within: Input should be a finite"),
         ("/nearest", {"x": 1, "y": 1, "sigma": "nan", "metric": "mahalanobis"}, "sigma"),
         ("/one", {}, "id"),
-        ("/7", {"after": "nan"}, "after"),
+        ("/7", {"after": "nan"}, "after: Input should be a finite"),
     ],
 )
 def test_a_question_that_makes_no_sense_is_refused_with_the_reason(
@@ -317,6 +322,10 @@ def document(**changes: Any) -> str:
         ("json", document(var_x=-1), "positive definite"),
         ("json", document(cov_xy=0.01), "positive definite"),
         ("json", document(y="north"), "number"),
+        ("json", document(last_seen=1e300), "give seconds"),
+        ("json", json.dumps(HEAD | {"landmarks": []}), "holds no landmarks"),
+        ("geojson", json.dumps({"type": "FeatureCollection", "features": []} | HEAD), "holds no landmarks"),
+        ("csv", "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind\n", "holds no landmarks"),
         ("csv", document(), "Columns"),
         ("geojson", document(), "features"),
         ("xml", "<map/>", "format"),
@@ -329,6 +338,13 @@ def test_a_map_that_makes_no_sense_is_refused_and_nothing_is_kept_of_it(
     content = body if isinstance(body, bytes) else body.encode()
     problem = assert_problem(maps.server.http.post("/map", params={"format": name}, content=content), 422)
     assert words in problem["detail"]
+    assert maps.server.get("/sessions")["sessions"] == before
+
+
+def test_a_name_that_cannot_be_shown_is_refused(maps: Maps) -> None:
+    before = maps.server.get("/sessions")["sessions"]
+    answer = maps.server.http.post("/map", params={"name": "a\0b"}, content=document())
+    assert "name is 'a\\x00b'" in assert_problem(answer, 422)["detail"]
     assert maps.server.get("/sessions")["sessions"] == before
 
 

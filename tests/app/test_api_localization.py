@@ -10,6 +10,7 @@ import pytest
 from serving import Json, Server, assert_problem, chosen
 
 SLAM = {"navigation": {"mode": "slam"}}
+ODOMETRY = {"stamp": 50.0, "x": 0.0, "y": 0.0, "heading": 0.0}
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +85,8 @@ def test_a_pose_given_by_hand_is_where_the_trajectory_goes_on(driving: Server) -
         ({"x": 0, "y": 0}, "/heading"),
         ({"x": 0, "y": 0, "heading": 0, "sigma_heading": 0}, "/sigma_heading"),
         ({"x": 0, "y": 0, "heading": 0, "z": 0}, "/z"),
+        ({"x": 1e8, "y": 0, "heading": 0}, "/x"),
+        ({"x": 0, "y": -1e200, "heading": 0}, "/y"),
     ],
 )
 def test_a_pose_that_is_none_is_refused(driving: Server, body: Json, pointer: str) -> None:
@@ -97,6 +100,25 @@ def test_nan_is_refused(driving: Server, path: str) -> None:
     stamp = '"stamp": 1, ' if path == "/odometry" else ""
     body = f'{{{stamp}"x": NaN, "y": 0, "heading": 0}}'
     assert_problem(driving.http.post(path, content=body, headers={"Content-Type": "application/json"}), 422)
+
+
+@pytest.mark.parametrize(
+    ("body", "pointers"),
+    [
+        (ODOMETRY | {"x": 1e8}, ["/x"]),
+        (ODOMETRY | {"stamp": 1.8e12, "z": 1}, ["/stamp", "/z"]),
+        ([ODOMETRY, ODOMETRY | {"heading": "north"}], ["/1/heading"]),
+        ([1], ["/0"]),
+        ("north", ["/"]),
+    ],
+)
+def test_wrong_odometry_is_told_once_and_where_it_is(
+    shared_server: Server, body: Any, pointers: list[str]
+) -> None:
+    before = shared_server.get("/localization")["odometry"]["taken"]
+    problem = assert_problem(shared_server.http.post("/odometry", json=body), 422)
+    assert [error["pointer"] for error in problem["errors"]] == pointers
+    assert shared_server.get("/localization")["odometry"]["taken"] == before
 
 
 def test_a_covariance_that_is_none_is_refused_and_the_pose_stays(driving: Server) -> None:
@@ -133,9 +155,14 @@ def test_odometry_that_jumps_or_goes_back_is_refused_and_what_follows_is_taken(s
     jump = send(100.2, 300.0)
     assert_problem(jump, 422)
     assert "jumped" in jump.json()["detail"]
+    assert "left out" in jump.json()["detail"]
+    assert "restart_clock" not in jump.json()["detail"]
     assert send(100.3, 300.05).status_code == 204
     assert_problem(send(99.0, 300.1), 422)
     assert send(99.1, 300.15).status_code == 204
+    state = shared_server.get("/localization")["odometry"]
+    assert (state["refused"], state["stamp"], state["used"]) == (2, 99.1, False)
+    assert "Nothing is localized" in state["problem"]
 
 
 def test_odometry_over_the_websocket_is_what_dead_reckoning_goes_by(server: Server, room: Path) -> None:
@@ -149,6 +176,20 @@ def test_odometry_over_the_websocket_is_what_dead_reckoning_goes_by(server: Serv
         server.change("PUT", "/source", {"kind": "recording", "name": room.name})
         last = stream.frame(lambda frame: chosen(frame) and frame["source"]["index"] == 29)
     assert last["localization"]["dead_reckoned"]["x"] == pytest.approx(0.5 * 2.9, abs=1e-6)
+    assert server.get("/localization")["odometry"]["used"]
+
+
+def test_odometry_by_another_clock_is_said_to_be_of_no_use(server: Server, room: Path) -> None:
+    """The room's scans are stamped from 100 s to 102.9 s."""
+    for stamp in (107.4, 107.9):
+        assert server.http.post("/odometry", json=ODOMETRY | {"stamp": stamp}).status_code == 204
+    server.change("PATCH", "/settings", SLAM)
+    server.change("PUT", "/source", {"kind": "recording", "name": room.name, "paused": True, "index": 29})
+    with server.stream() as stream:
+        stream.frame(lambda frame: chosen(frame) and frame["source"]["index"] == 29)
+    state = server.get("/localization")["odometry"]
+    assert (state["taken"], state["used"]) == (2, False)
+    assert "5.0 s ahead of the scans" in state["problem"]
 
 
 def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(driving: Server) -> None:
@@ -163,3 +204,35 @@ def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(drivi
     driving.change("PUT", "/localization/map", {"session": None})
     driving.change("PATCH", "/settings", SLAM)
     located(driving, lambda where: where["mode"] == "slam")
+
+
+def test_a_scan_that_was_passed_over_does_not_end_the_map_when_it_is_met(server: Server, room: Path) -> None:
+    server.change("PATCH", "/settings", SLAM)
+    server.change("PUT", "/source", {"kind": "recording", "name": room.name, "paused": True})
+    with server.stream() as stream:
+        for by in (1, 1, 12, -5):
+            server.change("POST", "/source/step", {"by": by})
+            at = server.get("/source")["index"]
+            frame = stream.frame(lambda f, at=at: chosen(f) and f["source"]["index"] == at)
+    assert frame["source"]["index"] == 9
+    stamps = [pose["stamp"] for pose in server.get("/trajectory")["poses"]]
+    assert stamps[0] < stamps[1] < frame["stamp"] < stamps[-1]  # still the map that was begun first
+
+
+def test_a_scan_that_is_shown_again_looks_as_it_did(driving: Server) -> None:
+    located(driving, lambda where: where["state"] == "tracking" and where["velocity"])
+    with driving.stream() as stream:
+        driving.change("PATCH", "/source", {"state": "paused"})
+        paused = stream.state(lambda s: s["source"]["state"] == "paused")["source"]["index"]
+        frames = [stream.frame(lambda f: f["source"]["index"] >= paused)]
+        driving.change("PATCH", "/settings", {"view": {"ellipse_scale": 11}})
+        frames.append(stream.frame(lambda f: f["sequence"] > frames[0]["sequence"]))
+        driving.change("PATCH", "/source", {"state": "playing"})
+    assert frames[0]["points"] == frames[1]["points"]
+    assert frames[0]["localization"]["pose"] == frames[1]["localization"]["pose"]
+
+
+def test_between_two_runs_a_pose_can_be_set(driving: Server) -> None:
+    driving.change("POST", "/localization/reset", None)
+    driving.change("POST", "/pose", {"x": 700.0, "y": 0.0, "heading": 0.0})
+    located(driving, lambda where: abs(where["pose"]["x"] - 700) < 50)

@@ -63,8 +63,21 @@ def test_other_programs_read_the_tables(filled, tmp_path):
     assert [row["var_y"] for row in document["landmarks"]] == [m.var_y for m in truth]
 
 
+POINT = {"type": "Point", "coordinates": [1, 2]}
+
+
 def as_json(**changes):
     return json.dumps(HEAD | {"landmarks": [GOOD, GOOD | changes]})
+
+
+def as_geojson(geometry, **changes):
+    """Two features; the second of this geometry, with these properties beside those that are needed."""
+    properties = {name: value for name, value in GOOD.items() if name not in "xy"}
+    features = [
+        {"geometry": POINT, "properties": properties},
+        {"geometry": geometry, "properties": properties | changes},
+    ]
+    return json.dumps(HEAD | {"features": features})
 
 
 @pytest.mark.parametrize(
@@ -88,11 +101,17 @@ def as_json(**changes):
         (
             "geojson",
             json.dumps(HEAD | {"features": [{"geometry": {"coordinates": [1, 2, 3]}, "properties": {}}]}),
-            "cannot be read",
+            "Landmark 1 is no Point",
         ),
+        ("geojson", as_geojson({"type": "Polygon", "coordinates": [1, 2]}), "Landmark 2 is no Point"),
+        ("geojson", as_geojson({"type": "Point", "coordinates": [1]}), "Landmark 2 is no Point"),
+        ("geojson", as_geojson({"type": "Point", "coordinates": "12"}), "Landmark 2 is no Point"),
+        ("geojson", as_geojson(POINT, x=7), "Landmark 2 has x among its properties"),
+        ("json", as_json(last_seen=1e300), "Landmark 2: .*give seconds"),
         ("csv", "", "Columns"),
         ("csv", CSV_HEAD.replace("x_m,", "x_mm,", 1) + "\n1,2,1,0,1,corner\n", "x_mm"),
-        ("csv", f"{CSV_HEAD}\n1,2,1,0,1,corner\n1,2,1,0,corner\n", "cannot be read"),
+        ("csv", f"{CSV_HEAD}\n1,2,1,0,1,corner\n1,2,1,0,corner\n", "Line 3 has 5 values, the header 6"),
+        ("csv", f"{CSV_HEAD}\n1,2,1,0,1,corner,7\n", "Line 2 has 7 values, the header 6"),
         ("csv", f"{CSV_HEAD}\n1,2,1,0,1,corner\n1,nan,1,0,1,corner\n", "Landmark 2: .*finite"),
         ("csv", f"{CSV_HEAD}\n1,2,1,0,1,corner\n1,2,1,,1,corner\n", "Landmark 2 .*cov_xy"),
         ("csv", f"{CSV_HEAD}\n1,two,1,0,1,corner\n", "two"),
@@ -104,6 +123,19 @@ def test_a_file_that_makes_no_sense_is_refused_and_changes_nothing(filled, tmp_p
     with pytest.raises(MapFileError, match=message):
         import_map(filled, path)
     assert list(filled) == before
+
+
+def test_points_in_space_are_taken_by_x_and_y(landmark_map, tmp_path):
+    text = as_geojson({"type": "Point", "coordinates": [3, 4, 5]})
+    (tmp_path / "map.geojson").write_text(text, "utf-8")
+    import_map(landmark_map, tmp_path / "map.geojson")
+    assert [(m.x, m.y) for m in landmark_map] == [(1, 2), (3, 4)]
+
+
+def test_blank_lines_of_a_table_are_no_landmarks(landmark_map, tmp_path):
+    (tmp_path / "map.csv").write_text(f"{CSV_HEAD}\n1,2,1,0,1,corner\n\n3,4,1,0,1,post\n\n", "utf-8")
+    import_map(landmark_map, tmp_path / "map.csv")
+    assert [(m.x, m.y, m.kind) for m in landmark_map] == [(1, 2, "corner"), (3, 4, "post")]
 
 
 def test_files_that_cannot_be_are_refused(filled, tmp_path):
