@@ -4,10 +4,19 @@ import errno
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from app.cli_options import Topic
+
+if TYPE_CHECKING:
+    from lidarcore import Scan
+    from lidarcore.experiments.cwlf_claims import Claim
+    from lidarcore.experiments.environments import Design
 
 QUICK_RUNS = 2
 
@@ -16,30 +25,90 @@ experiment = typer.Typer(
 )
 
 
-@experiment.callback()
-def _experiments() -> None:
-    """Keeps the name of the experiment a part of the command while there is only one."""
+Output = Annotated[
+    Path, typer.Option("-o", "--output", help="FILE.html for the report; replaced if it exists")
+]
+Seed = Annotated[int, typer.Option(min=0, help="of everything that is random")]
+Workers = Annotated[int | None, typer.Option(min=1, help="processes; one for each core if not given")]
+Quick = Annotated[bool, typer.Option("--quick", help="100 scans of each room only, to try it out")]
+Recording = Annotated[
+    Path | None,
+    typer.Option(help="a recording of a sensor at rest, in place of the simulated rooms", exists=True),
+]
+Scans = Annotated[
+    int | None, typer.Option(min=10, help="scans of each room, 2000 if not given; or of the recording, all")
+]
+SigmaRange = Annotated[
+    float | None, typer.Option(help="m, the methods are told; the papers' 0.05 if not given")
+]
+SigmaBearing = Annotated[float | None, typer.Option(help="rad, likewise; 0.0035 (0.2°) if not given")]
+
+
+@experiment.command()
+def cwlf(
+    output: Output = Path("cwlf.html"),
+    seed: Seed = 0,
+    scans: Scans = None,
+    recording: Recording = None,
+    topic: Topic = None,
+    sigma_range: SigmaRange = None,
+    sigma_bearing: SigmaBearing = None,
+    quick: Quick = False,
+    workers: Workers = None,
+) -> None:
+    """Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time."""
+    _check(output)
+    from lidarcore.experiments import cwlf as paper
+    from lidarcore.experiments.cwlf_claims import claims
+    from lidarcore.experiments.cwlf_report import html
+    from lidarcore.experiments.environments import Design
+
+    design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
+    with _progress(paper.PARTS) as done:
+        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
+    output.write_text(html(result), "utf-8")
+    _tell(output, claims(result))
+
+
+@experiment.command()
+def wctls(
+    output: Output = Path("wctls.html"),
+    seed: Seed = 0,
+    scans: Scans = None,
+    recording: Recording = None,
+    topic: Topic = None,
+    sigma_range: SigmaRange = None,
+    sigma_bearing: SigmaBearing = None,
+    quick: Quick = False,
+    workers: Workers = None,
+) -> None:
+    """Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty."""
+    _check(output)
+    from lidarcore.experiments import wctls as paper
+    from lidarcore.experiments.environments import Design
+    from lidarcore.experiments.wctls_claims import claims
+    from lidarcore.experiments.wctls_report import html
+
+    whole = Design(seed=seed, split_threshold=paper.THRESHOLD)
+    design = _design(whole, scans, sigma_range, sigma_bearing, quick)
+    with _progress(paper.PARTS) as done:
+        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
+    output.write_text(html(result), "utf-8")
+    _tell(output, claims(result))
 
 
 @experiment.command("clustering-ekf")
 def clustering_ekf(
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="FILE.html for the report; replaced if it exists")
-    ] = Path("clustering-ekf.html"),
-    seed: Annotated[int, typer.Option(min=0, help="of everything that is random")] = 0,
+    output: Output = Path("clustering-ekf.html"),
+    seed: Seed = 0,
     runs: Annotated[
         int | None, typer.Option(min=1, help="drives along each trajectory; 20 if not given, 2 with --quick")
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="one scan a second only, to try it out")] = False,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="processes; one for each core if not given")
-    ] = None,
+    workers: Workers = None,
 ) -> None:
     """Four ways to cluster lidar points, with and without a Kalman filter, on three trajectories."""
-    if output.is_dir() or not output.absolute().parent.is_dir():  # told before minutes of work are lost
-        raise FileNotFoundError(
-            errno.ENOENT, "is no file in a folder that exists, give one for --output", str(output)
-        )
+    _check(output)
     from lidarcore.experiments import clustering_ekf as paper
     from lidarcore.experiments.clustering_ekf_report import html
 
@@ -50,6 +119,40 @@ def clustering_ekf(
         result = paper.run(design, workers or os.cpu_count() or 1, done)
     output.write_text(html(result), "utf-8")
     typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
+
+
+def _check(output: Path) -> None:
+    """Told before minutes of work are lost."""
+    if output.is_dir() or not output.absolute().parent.is_dir():
+        raise FileNotFoundError(
+            errno.ENOENT, "is no file in a folder that exists, give one for --output", str(output)
+        )
+
+
+def _design(
+    design: "Design", scans: int | None, sigma_range: float | None, sigma_bearing: float | None, quick: bool
+) -> "Design":
+    from lidarcore import SensorNoise
+
+    noise = SensorNoise(
+        design.noise.sigma_range if sigma_range is None else sigma_range,
+        design.noise.sigma_bearing if sigma_bearing is None else sigma_bearing,
+    )
+    design = replace(design, noise=noise)
+    if quick:
+        design = design.quick()
+    return design if scans is None else replace(design, scans=scans)
+
+
+def _read(recording: Path | None, topic: str | None, scans: int | None) -> "list[Scan] | None":
+    from lidarcore import open_recording
+
+    return None if recording is None else list(islice(open_recording(recording, topic), scans))
+
+
+def _tell(output: Path, claims: "list[Claim]") -> None:
+    differ = sum(agrees is False for *_, agrees in claims)
+    typer.echo(f"{output}: {len(claims)} claims of the paper, {differ} of them differ from what was measured")
 
 
 @contextmanager

@@ -41,7 +41,7 @@ def bars(rows: Sequence[Bar | str], most: float, *, title: str, least: float | N
         else:
             parts.append(_bar(row, x, y))
         y += _ROW
-    return _svg(WIDTH, y + 4, "".join(parts), title)
+    return svg(WIDTH, y + 4, "".join(parts), title)
 
 
 def _bar(bar: Bar, x: Callable[[float], float], y: float) -> str:
@@ -68,6 +68,7 @@ class Map:
     points     class and points (M, 2) of each, drawn as dots
     ellipses   class, centres (L, 2) and covariances (L, 2, 2): 95 %
     view       outline (M, 2) of what the sensor could see, if shown
+    texts      written at texts_at (T, 2)
     """
 
     title: str
@@ -78,6 +79,8 @@ class Map:
     points: Sequence[tuple[str, Array]] = ()
     ellipses: Sequence[tuple[str, Array, Array]] = ()
     view: Array = field(default_factory=lambda: np.empty((0, 2)))
+    texts: Sequence[str] = ()
+    texts_at: Array = field(default_factory=lambda: np.empty((0, 2)))
 
 
 def chart(map_: Map, width: int = WIDTH) -> str:
@@ -100,7 +103,11 @@ def chart(map_: Map, width: int = WIDTH) -> str:
     ]
     parts += [f'<path class="dots {style}" d="{_dots(at(xy))}"/>' for style, xy in map_.points]
     parts += [f'<path class="line {style}" d="{_path(at(xy))}"/>' for style, xy in map_.lines if len(xy) > 1]
-    return _svg(width, (y1 - y0) * scale, "".join(parts), map_.title)
+    parts += [
+        f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="middle">{escape(text)}</text>'
+        for text, (x, y) in zip(map_.texts, at(map_.texts_at), strict=True)
+    ]
+    return svg(width, (y1 - y0) * scale, "".join(parts), map_.title)
 
 
 def _outlines(centres: Array, covariances: Array) -> Array:
@@ -134,8 +141,9 @@ def _dots(xy: Array) -> str:
     return "".join(f"M{x:.1f} {y:.1f}h0" for x, y in xy)
 
 
-def _svg(width: float, height: float, content: str, title: str) -> str:
+def svg(width: float, height: float, content: str, title: str, style: str = "drawing") -> str:
+    """A drawing of this size, of a class of the style sheet, that says what it is."""
     return (
-        f'<svg viewBox="0 0 {width:g} {height:.0f}" role="img" aria-label="{escape(title)}">'
+        f'<svg class="{style}" viewBox="0 0 {width:g} {height:.0f}" role="img" aria-label="{escape(title)}">'
         f"<title>{escape(title)}</title>{content}</svg>"
     )

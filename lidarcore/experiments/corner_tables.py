@@ -1,0 +1,116 @@
+"""Tables and maps of corners for the reports: what is claimed, what scatters, what is possible."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from lidarcore.evaluation.consistency_design import KINDS
+from lidarcore.evaluation.intervals import Interval
+from lidarcore.experiments import report
+from lidarcore.experiments.corner_study import CornerStudy
+from lidarcore.experiments.environments import Environment
+from lidarcore.experiments.figures import Map, chart
+from lidarcore.lines import FITTERS
+from lidarcore.scan import Array
+
+SCALE = 10  # of the ellipses in maps, as in [WCTLS, Fig. 3]
+_OF_95 = 2.4477  # sigmas of the ellipses that maps draw
+_MARGIN = 0.6  # m
+
+
+def sigmas(environment: Environment, fitters: Sequence[str], caption: str) -> str:
+    """The paper's table of standard deviations, with the true scatter and the least possible beside them, mm."""
+    study = environment.study
+    columns: dict[str, Array] = {}
+    for name in fitters:
+        title = _short(name)
+        columns[f"{title} published"] = study.claimed(name, "published")
+        columns[f"{title} consistent"] = study.claimed(name, "consistent")
+        columns[f"{title} scatter"] = study.scatter(name)
+    if study.bounds is not None:
+        columns["least possible"] = study.bound
+    headers = ["corner", *(f"{title} {axis}" for title in columns for axis in ("σx", "σy"))]
+    values = 1e3 * np.column_stack(list(columns.values()))
+    numbers = [str(number) for number in range(1, len(values) + 1)]
+    rows = [
+        [number, *(f"{value:.1f}" for value in row)]
+        for number, row in zip([*numbers, "mean"], [*values, values.mean(axis=0)], strict=True)
+    ]
+    return report.table(caption, headers, rows)
+
+
+def honesty(environment: Environment, fitters: Sequence[str], caption: str) -> str:
+    """Coverage and errors of every fitter, with segments known and with those that are found."""
+    studies: list[tuple[str, CornerStudy]] = [("known" if environment.found else "found", environment.study)]
+    if environment.found is not None:
+        studies.append(("found", environment.found))
+    rows = [
+        [
+            FITTERS[name].title,
+            segments,
+            _share(study.found(name)),
+            _ratio(study.rms_ratio(name, fitters[0])),
+            "" if study.bounds is None else f"{100 * study.bias(name):.0f}",
+            *(_share(study.coverage(name, kind)) for kind in KINDS),
+            *(f"{1e6 * np.median(study.scan_areas(name, kind)):.0f}" for kind in KINDS),
+            f"{1e6 * study.actual_area(name):.0f}",
+        ]
+        for segments, study in studies
+        for name in fitters
+    ]
+    headers = (
+        "method", "segments", "corners found, %", f"RMS error / {_short(fitters[0])}", "bias / RMS error, %",
+        "in the published 95 % ellipse, %", "in the consistent one, %",
+        "published area, mm²", "consistent area, mm²", "true area, mm²",
+    )  # fmt: skip
+    return report.table(caption, headers, rows, texts=2)
+
+
+def maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Two panels: ellipses as published and as they truly are, ten times as large; classes by fitter."""
+    study = environment.study
+    points, corners = environment.points, study.corners
+    low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+    numbers = [str(number) for number in range(1, len(corners) + 1)]
+    panels = []
+    for what, of in (
+        ("published", lambda name: study.claims(name, "published")),
+        ("true scatter", study.scattered),
+    ):
+        title = f"{environment.name}: {what}, {SCALE} times as large"
+        drawn = Map(
+            title, (low[0], high[0], low[1], high[1]), np.empty((0, 2)), 0.0, [],
+            [("scan", points), ("seen", np.zeros((1, 2)))],
+            [(style, corners, (SCALE / _OF_95) ** 2 * of(name)) for name, style in styles.items()],
+            texts=numbers, texts_at=_aside(corners),
+        )  # fmt: skip
+        panels.append((title, chart(drawn, 560)))
+    return panels
+
+
+def _aside(corners: Array) -> Array:
+    """A little farther from the sensor, where numbers do not hide corners."""
+    away: Array = corners * (1 + 0.35 / np.linalg.norm(corners, axis=1, keepdims=True))
+    return away
+
+
+def heading(environment: Environment) -> str:
+    """Its name at the beginning of a sentence."""
+    return environment.name[0].upper() + environment.name[1:]
+
+
+def legend(styles: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Names of fitters and their colours."""
+    return [(FITTERS[name].title, f"var(--{style})") for name, style in styles.items()]
+
+
+def _short(fitter: str) -> str:
+    return FITTERS[fitter].title.split(",")[0]
+
+
+def _share(figure: Interval) -> str:
+    return f"{100 * figure.value:.1f} ({100 * figure.low:.1f} to {100 * figure.high:.1f})"
+
+
+def _ratio(figure: Interval) -> str:
+    return f"{figure.value:.3f} ({figure.low:.3f} to {figure.high:.3f})"

@@ -1,0 +1,119 @@
+"""What the experiments of [CWLF] and [WCTLS] look at: two rooms each, or a recording."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from lidarcore.evaluation.trials import SEGMENTATIONS, Segmentation
+from lidarcore.experiments.corner_study import CornerStudy, recorded, simulated
+from lidarcore.experiments.paper_rooms import BEAMS, NOISE, Room
+from lidarcore.experiments.parallel import run_all
+from lidarcore.noise import SensorNoise
+from lidarcore.scan import Array, Scan
+from lidarcore.settings import ExtractionSettings
+
+QUICK_SCANS = 100
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Design:
+    """How an experiment is run: so many scans of each room, with the noise that every method is told.
+
+    split_threshold (m) is that of the paper, for the real segmentation.
+    """
+
+    seed: int = 0
+    scans: int = 2000
+    noise: SensorNoise = field(default_factory=lambda: NOISE)
+    split_threshold: float = 0.05
+
+    @property
+    def settings(self) -> ExtractionSettings:
+        """Of the extraction."""
+        return ExtractionSettings(noise=self.noise, split_threshold=self.split_threshold)
+
+    def quick(self) -> "Design":
+        """The same with few scans: to try it out."""
+        return replace(self, scans=QUICK_SCANS)
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """A room or a recording, and what came out.
+
+    room   None for a recording
+    points (N, 2) m, one scan, sensor frame: without noise if simulated
+    study  of a room with segments known, of a recording with those that extraction finds
+    found  of a room, with the segments that extraction finds; None for a recording
+    """
+
+    name: str
+    room: Room | None
+    points: Array
+    study: CornerStudy
+    found: CornerStudy | None
+
+
+def look_around(
+    rooms: Sequence[Room], design: Design, workers: int, done: Callable[[], None]
+) -> list[Environment]:
+    """Simulate every room; `done` is called twice for each. Numbers depend on the design only."""
+    tasks = [(r, segmentation) for r in range(len(rooms)) for segmentation in SEGMENTATIONS]
+    studies = run_all(partial(_study, tuple(rooms), design), tasks, workers, done)
+    environments = []
+    for room, known, found in zip(rooms, studies[::2], studies[1::2], strict=True):
+        place = room.place(design.noise)
+        points = place.ranges[:, None] * np.column_stack([np.cos(place.bearings), np.sin(place.bearings)])
+        environments.append(Environment(room.name, room, points, known, found))
+    return environments
+
+
+def _study(rooms: Sequence[Room], design: Design, task: tuple[int, Segmentation]) -> CornerStudy:
+    r, segmentation = task
+    # Both segmentations are shown the same scans.
+    return simulated(
+        rooms[r].place(design.noise), segmentation, design.settings, design.scans, [design.seed, r]
+    )
+
+
+def look_at(scans: Sequence[Scan], design: Design, fitters: Sequence[str]) -> list[Environment]:
+    """A recording of a sensor at rest. Raises EvaluationError if it cannot be used."""
+    study = recorded(scans, design.settings, fitters)
+    return [Environment("the recording", None, scans[0].xy[scans[0].valid], study, None)]
+
+
+def set_up(design: Design, environments: Sequence[Environment]) -> list[str]:
+    """What was simulated, or recorded, in sentences."""
+    noise = design.noise
+    told = (
+        f"Every method is told {1e3 * noise.sigma_range:g} mm and {np.degrees(noise.sigma_bearing):.3g}° of noise, as "
+        "independent Gaussian errors of range and bearing. The 50 mm are the papers'. Of the bearing they give the "
+        "resolution, 0.391°; half of it is assumed."
+    )
+    if environments[0].room is None:
+        study = environments[0].study
+        return [
+            f"{study.scans} scans of a recording, the sensor at rest; corners: {len(study.corners)}. There is no "
+            "truth: errors are those from the mean over all scans, so that a "
+            "bias common to all does not show. The "
+            "sensor may be better, or worse, than the noise the methods are told.",
+            told,
+        ]
+    rooms = "; ".join(
+        f"{e.name}, {e.room.size} with pillars, niches and cabinets, {e.room.sections} pieces of wall and "
+        f"{e.room.corners} corners in view"
+        for e in environments
+        if e.room
+    )
+    return [
+        f"The papers' scans are not public. Rooms of their sizes and numbers of corners are simulated: {rooms}.",
+        told,
+        f"Of each room {design.scans} scans of {BEAMS} beams (0.391°) from one place, seed {design.seed}. "
+        "Segments known: every beam is of the wall it truly met. Found: by iterative end point fit, threshold "
+        f"{1e3 * design.split_threshold:g} mm as in the paper, and more where noise explains more; with noise of that "
+        "size, small walls merge with others, and corners are lost. Tables are of known segments, so that they show "
+        "the formulas alone; claims are those of the scan with the median ellipse.",
+        "The scatter is the RMS error over all scans, about the truth. Least possible is the Cramér-Rao bound.",
+    ]
