@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli_options import Topic
+from app.cli_options import Topic, end_like_ctrl_c
 
 if TYPE_CHECKING:
     from lidarcore import Scan
@@ -23,6 +23,12 @@ QUICK_RUNS = 2
 experiment = typer.Typer(
     help="Run an experiment of a paper again, and write a report of it.", no_args_is_help=True
 )
+
+
+@experiment.callback()
+def begin() -> None:
+    """Run an experiment of a paper again, and write a report of it."""
+    end_like_ctrl_c()
 
 
 Output = Annotated[

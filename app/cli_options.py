@@ -1,6 +1,7 @@
 """Options that several commands share, and the settings they make."""
 
 import json
+import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,14 @@ SettingsFile = Annotated[
     Path | None,
     typer.Option("--settings", help="a JSON file of settings, as GET /api/v1/settings gives them"),
 ]
+
+
+def end_like_ctrl_c() -> None:
+    """SIGTERM, and SIGHUP unless `nohup` has it ignored, end the command as Ctrl-C does, and what it has started."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        if number and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
 
 
 @contextmanager

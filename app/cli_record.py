@@ -1,6 +1,5 @@
 """The command `lidarcore record`."""
 
-import signal
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -9,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli_options import Set, SettingsFile, settings_from
+from app.cli_options import Set, SettingsFile, end_like_ctrl_c, settings_from
 
 if TYPE_CHECKING:
     from app.recorder import AsyncRecorder, RecorderJson
@@ -44,7 +43,7 @@ def record(
 
     check_wishes(mode if emulator else None, rpm)  # what modes a real one has it has to be asked
     chosen = settings_from(settings, set_)
-    _end_like_ctrl_c()
+    end_like_ctrl_c()
     recorder, troubles = AsyncRecorder(), list[str]()
     with suppress(KeyboardInterrupt), ExitStack() as stack:
         stack.callback(recorder.stop)
@@ -66,14 +65,6 @@ def record(
     _conclude(output, recorder.status, troubles)
     if duration is not None and recorder.status["duration"] < ENOUGH * duration:
         raise SystemExit(1)
-
-
-def _end_like_ctrl_c() -> None:
-    """SIGTERM, and SIGHUP unless `nohup` has it ignored, end the recording and close it."""
-    for name in ("SIGTERM", "SIGHUP"):
-        number = getattr(signal, name, None)  # Windows has no SIGHUP
-        if number and signal.getsignal(number) == signal.SIG_DFL:
-            signal.signal(number, signal.default_int_handler)
 
 
 def _follow(

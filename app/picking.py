@@ -1,6 +1,6 @@
-"""What a click in the scene means: the corner, or the landmark, nearest to it."""
+"""What a click in the scene means: the corner and the landmark nearest to it."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,40 +8,49 @@ import numpy as np
 from app.canvas import Canvas
 from app.frame import Frame
 from app.scene_map import pose_of
-from app.shapes import Array
-from lidarcore.poses import compose, inverse
+from app.shapes import Array, in_world
 
 Select = Callable[[int], None]
+Places = list[tuple[int, Array]]  # ids and (2,) m, world frame
+
+SAME_SPOT = 0.3  # m; a landmark and the corner taken for it lie on top of each other, so one click means both
 
 
 class Picking:
-    """Tells the id of a corner or landmark of the frame that someone clicked."""
+    """Tells the ids of the corner and the landmark of the frame that someone clicked."""
 
     def __init__(self, canvas: Canvas, select_corner: Select, select_landmark: Select) -> None:
         self.frame: Frame | None = None
         self._select_corner, self._select_landmark = select_corner, select_landmark
-        canvas.on_click("markers", self._clicked_corner)
-        canvas.on_click("landmarks", self._clicked_landmark)
+        canvas.on_click("markers", lambda event: self._clicked(event, np.inf, SAME_SPOT))
+        canvas.on_click("landmarks", lambda event: self._clicked(event, SAME_SPOT, np.inf))
 
-    def _clicked_corner(self, event: Any) -> None:
+    def _clicked(self, event: Any, corner_within: float, landmark_within: float) -> None:
+        """Select the nearest of each kind, if it is so near (m) to where the floor was clicked."""
         if self.frame is not None and (at := _on_floor(event)) is not None:
-            in_sensor = compose(inverse(pose_of(self.frame)), np.append(at, 0.0))[:2]
-            _choose(self.frame.corner_positions(), in_sensor, self._select_corner)
-
-    def _clicked_landmark(self, event: Any) -> None:
-        where = self.frame.where if self.frame else None
-        if where is not None and (at := _on_floor(event)) is not None:
-            known = where.whereabouts.landmarks
-            ids = (where.stored.get(id_) for id_ in known.ids.tolist())
-            positions = [(id_, xy) for id_, xy in zip(ids, known.points.xy, strict=True) if id_ is not None]
-            _choose(positions, at, self._select_landmark)
+            _choose(_corners(self.frame), at, corner_within, self._select_corner)
+            _choose(_landmarks(self.frame), at, landmark_within, self._select_landmark)
 
 
-def _choose(positions: Iterable[tuple[int, Array]], at: Array, select: Select) -> None:
-    """Select what is nearest to the spot (2,) m."""
-    nearest = min(positions, key=lambda row: float(np.hypot(*(row[1] - at))), default=None)
-    if nearest is not None:
-        select(nearest[0])
+def _corners(frame: Frame) -> Places:
+    pose = pose_of(frame)
+    return [(id_, in_world(pose, xy[None])[0]) for id_, xy in frame.corner_positions()]
+
+
+def _landmarks(frame: Frame) -> Places:
+    where = frame.where
+    if where is None:
+        return []
+    known = where.whereabouts.landmarks
+    ids = (where.stored.get(id_) for id_ in known.ids.tolist())
+    return [(id_, xy) for id_, xy in zip(ids, known.points.xy, strict=True) if id_ is not None]
+
+
+def _choose(places: Places, at: Array, within: float, select: Select) -> None:
+    """Select what is nearest to the spot (2,) m, unless that is further away."""
+    distance, id_ = min(((float(np.hypot(*(xy - at))), id_) for id_, xy in places), default=(np.inf, 0))
+    if places and distance <= within:
+        select(id_)
 
 
 def _on_floor(event: Any) -> Array | None:
