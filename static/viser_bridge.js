@@ -9,6 +9,7 @@
   const EDGE = 1.02; // and what has to be left of it
   const SMALL = 0.6; // of the view: a room that fills less than this is looked at again
   const FOLLOW_MS = 1000;
+  const CLICK_PX = 4; // a pointer that moves less while it is pressed
   const SHORT_DRAG = 12; // px; shorter ones have no direction
   const AT_ORIGIN = { x: 0, y: 0, heading: 0 };
   // viser's own panel and notices have no place here: the page around this one has its own.
@@ -20,6 +21,7 @@
 
   let rotating = false;
   let moved = false; // by the user, since the last fit
+  let pressed = null; // where the pointer went down last
   let placing = null; // what takes the drag of a pose
 
   // viser only reconnects while its window has the focus, which a frame or a wall display rarely has.
@@ -180,6 +182,12 @@
     return onFloor(eye.clone().addScaledVector(beam, -eye.y / beam.y));
   }
 
+  /** Whether the pointer drags the view; a click that selects something does not. */
+  function isDrag({ buttons, clientX, clientY }) {
+    if (!buttons || !pressed) return false;
+    return Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY) > CLICK_PX;
+  }
+
   function tell(message) {
     if (window.parent !== window) window.parent.postMessage(message, location.origin);
   }
@@ -207,9 +215,9 @@
   style.textContent = STYLE;
   document.head.append(style);
   window.addEventListener("keydown", forwardKey, true);
-  for (const gesture of ["pointerdown", "wheel"]) {
-    window.addEventListener(gesture, () => (moved ||= !placing), { capture: true, passive: true });
-  }
+  window.addEventListener("wheel", () => (moved ||= !placing), { capture: true, passive: true });
+  window.addEventListener("pointerdown", (event) => (pressed = event), true);
+  window.addEventListener("pointermove", (event) => (moved ||= !placing && isDrag(event)), true);
   const ready = start();
   window.lidarView = { setRotate, fit, setPlacing };
   keepFollowing();

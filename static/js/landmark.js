@@ -35,9 +35,11 @@ async function refresh({ landmark: id }, landmarks, panel) {
 }
 
 function show(landmark) {
+  const isOther = landmark && landmark.id !== shown?.id;
   shown = landmark;
   if (!shown) asked = { id: null, at: 0 };
   draw();
+  if (isOther) $("landmark").scrollIntoView({ block: "nearest" });
 }
 
 function draw() {

@@ -10,7 +10,7 @@ import { mountDial } from "./dial.js";
 import { mountFaults } from "./faults.js";
 import { mountFilter } from "./filter.js";
 import { mountHeader } from "./header.js";
-import { remember } from "./history.js";
+import { forget, remember } from "./history.js";
 import { mountLandmark } from "./landmark.js";
 import { mountLandmarks, receiveLandmarks } from "./landmarks.js";
 import { mountLink } from "./link.js";
@@ -21,7 +21,8 @@ import { mountParameters } from "./parameters.js";
 import { mountPlots } from "./plots.js";
 import { mountRecordings } from "./recordings.js";
 import { mountRejections } from "./rejections.js";
-import { mountScene } from "./scene.js";
+import { beginsAnew } from "./run.js";
+import { fitScene, mountScene } from "./scene.js";
 import { fieldsOf } from "./schema.js";
 import { attempt, isPlaying, settings, transport } from "./session.js";
 import { mountShortcuts, press } from "./shortcuts.js";
@@ -112,6 +113,10 @@ function accept(state) {
 
 /** A frame is late by more than its way here if it comes first over a connection, again, or while paused. */
 function show(frame) {
+  if (beginsAnew(frame)) {
+    forget();
+    fitScene();
+  }
   const isNew = frame.stamp !== get("frame")?.stamp;
   remember(frame, isNew && !joining && isPlaying(get("source")));
   joining = false;

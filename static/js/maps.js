@@ -13,7 +13,7 @@ const LOADED = ["json", "csv", "geojson"];
 
 const clearButton = el(
   "button",
-  { type: "button", onclick: () => confirmClear(get("localization").session) },
+  { type: "button", disabled: true, onclick: () => confirmClear(get("localization").session) },
   "Clear",
 );
 
@@ -42,6 +42,7 @@ export function mountMaps() {
   );
   on(["panel", "localization"], refresh);
   on(["maps", "localization", "landmarks"], draw);
+  on(["localization"], offer);
 }
 
 let listed = ""; // when the maps were asked for: with which panel open and which map in use
@@ -60,8 +61,11 @@ async function list() {
 function draw({ sessions, store }, { session }, landmarks) {
   const live = { session, landmarks: landmarks.size };
   remake($("map-list"), [sessions, store.error, live], () => rows(sessions, store, live));
-  const saved = session ?? sessions.at(-1)?.id ?? null;
-  remake($("map-save"), saved, () => (saved === null ? [] : saveLinks(saved)));
+}
+
+/** What is saved and cleared is the map that is built or localized in. */
+function offer({ session }) {
+  remake($("map-save"), [session], () => (session === null ? [nothingToSave()] : saveLinks(session)));
   clearButton.disabled = session === null;
 }
 
@@ -93,6 +97,9 @@ function row({ id, source, mode, started, landmarks }, live) {
   const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, count));
   return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
 }
+
+const nothingToSave = () =>
+  el("p", { class: "muted" }, "Nothing to save or clear: no map is built or localized in.");
 
 const saveLinks = (session) => [
   el("p", { class: "muted" }, `Save map ${session} as`),

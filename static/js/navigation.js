@@ -3,9 +3,11 @@
 import { request } from "./api.js";
 import { segmentedRow } from "./bindings.js";
 import { $, el, setText } from "./dom.js";
+import { forget } from "./history.js";
 import { placingControls } from "./placing.js";
 import { attempt, changeSetting, setting } from "./session.js";
 import { on } from "./store.js";
+import { showPanel } from "./tabs.js";
 import { layerChips } from "./view.js";
 import { whereabouts } from "./whereabouts.js";
 
@@ -31,10 +33,21 @@ const reset = el(
   {
     type: "button",
     title: "SLAM begins with an empty map, localization with no idea of the pose",
-    onclick: () => attempt(() => request("POST", "localization/reset"), "The filter was not reset"),
+    onclick: () => attempt(begin, "The filter was not reset"),
   },
   "Reset",
 );
+
+async function begin() {
+  await request("POST", "localization/reset");
+  forget();
+}
+
+/** Where to choose what finds clusters. */
+function showClusters() {
+  showPanel("setup", { focus: true });
+  $("clusters").scrollIntoView();
+}
 
 export function mountNavigation() {
   $("navigation").append(
@@ -44,12 +57,19 @@ export function mountNavigation() {
       ["corners", "Corners"],
       ["clusters", "Clusters"],
     ]),
+    el(
+      "p",
+      { class: "muted", id: "cluster-hint" },
+      "Walls make no good landmarks; posts, legs and trunks do. What finds them: ",
+      el("button", { type: "button", class: "link", onclick: showClusters }, "Setup, Clusters"),
+    ),
     segmentedRow("Motion", "navigation.motion", MOTIONS, { title: MOTION_HINT }),
     whereabouts(),
     el("div", { class: "buttons" }, ...placingControls(), reset),
   );
   on(["fields"], (fields) => $("navigation").append(layerChips(fields, { ofMap: true })));
-  on(["settings"], ({ navigation: { mode } }) => {
+  on(["settings"], ({ navigation: { mode, landmarks } }) => {
+    $("cluster-hint").hidden = landmarks !== "clusters";
     setText($("mode-about"), ABOUT[mode]);
     reset.disabled = mode === "off";
   });

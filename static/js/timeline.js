@@ -44,8 +44,14 @@ export function mountTimeline() {
     el("div", { class: "buttons pace" }, speed, loop),
     recorderControls(),
   );
+  $("timeline").addEventListener("click", releaseFocus);
   on(["source", "connection"], drawSource);
   on(["source", "frame"], drawPosition);
+}
+
+/** A button that was pressed by the pointer leaves the space key to play and pause. */
+function releaseFocus({ detail, target }) {
+  if (detail) target.closest("button")?.blur();
 }
 
 function drawSource(source, connection) {

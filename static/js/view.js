@@ -50,18 +50,26 @@ const PATHS = [
   { layer: "truth", sign: "true", label: "True way", isKnown: ({ truth }) => truth },
 ];
 
+/** What is drawn of the map: layer -> signs. */
+const MAPPED = [
+  { layer: "landmarks", sign: "landmark", label: "Landmark" },
+  { layer: "landmarks", sign: "tentative", label: "Tentative" },
+  { layer: "associations", sign: "association", label: "Match" },
+];
+
 /** The legend names the methods and ways in the frame and states by how much the ellipses are enlarged. */
 function drawLegend(frame, settings, methods) {
   const { ellipse_scale: scale, layers } = settings.view;
   const { localization: now } = frame;
   const paths = PATHS.filter(({ layer, isKnown }) => now && layers[layer] && isKnown(now));
+  const mapped = MAPPED.filter(({ layer }) => now && layers[layer]);
   const ellipses = `Ellipses 1σ × ${fixed(scale, Number.isInteger(scale) ? 0 : 1)}, ${frame.covariance}`;
-  const shown = [frame.methods, paths, layers.ellipses];
+  const shown = [frame.methods, paths, mapped, layers.ellipses];
   remake($("legend"), [...shown, ellipses], () => {
     const titles = new Map(methods.map(({ name, title }) => [name, title]));
     const entries = [
-      ...frame.methods.map((name) => el("li", {}, swatch(name), titles.get(name) ?? name)),
-      ...paths.map(({ sign, label }) => el("li", {}, stroke(sign), label)),
+      ...frame.methods.map((name) => el("li", { class: "method-name" }, swatch(name), titles.get(name) ?? name)),
+      ...[...paths, ...mapped].map(({ sign, label }) => el("li", {}, stroke(sign), label)),
     ];
     return [el("ul", {}, ...entries), el("p", {}, layers.ellipses ? ellipses : "Ellipses hidden")];
   });

@@ -4,6 +4,7 @@
 import { $, el, remake, setText } from "./dom.js";
 import { isStale } from "./live.js";
 import { errorOf, positionSigma } from "./pose.js";
+import { isPlaying } from "./session.js";
 import { on } from "./store.js";
 import { degrees, fixed, metres, microseconds, millimetres, UNKNOWN, wholeNumber } from "./units.js";
 
@@ -36,6 +37,9 @@ const POSE = [
   },
 ];
 
+const NIS_ABOUT =
+  "NIS mostly below its band: the ellipses are larger than they need be, lower the noise or Unevenness. Mostly above: they are smaller than true.";
+
 const inMm = (variance) => `±\u2009${millimetres(Math.sqrt(variance))}\u2009mm`;
 
 const COUNTS = [
@@ -67,8 +71,8 @@ const COUNTS = [
   {
     key: "locate",
     label: "Time per scan",
-    hint: "Time to find the pose",
-    read: (_, { locate_us }) => locate_us,
+    hint: "Time to find the pose; of a scan shown again it is only looked up",
+    read: (_, { locate_us }, source) => (isPlaying(source) ? locate_us : NaN),
     text: microseconds,
   },
 ];
@@ -83,6 +87,7 @@ export function whereabouts() {
     poseList(),
     countList(),
     el("dl", { class: "facts", id: "comparison" }),
+    el("p", { class: "muted", id: "nis-about" }, NIS_ABOUT),
   );
 }
 
@@ -136,8 +141,9 @@ function draw({ localization: now, timings }, { navigation }, source, connection
     setText($(`pose-sigma-${key}`), isPlaced(now) ? sigma(now) : "");
   }
   for (const { key, read, text = wholeNumber } of COUNTS)
-    setText($(`count-${key}`), now ? text(read(now, timings)) : UNKNOWN);
+    setText($(`count-${key}`), now ? text(read(now, timings, source)) : UNKNOWN);
   const lines = now ? comparison(now) : [];
+  $("nis-about").hidden = !now?.dof;
   remake($("comparison"), lines, () =>
     lines.map(([label, text, hint]) => el("div", { title: hint }, el("dt", {}, label), el("dd", {}, text))),
   );

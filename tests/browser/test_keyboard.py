@@ -84,6 +84,13 @@ def test_keys_pressed_in_the_scene_work_too(keys: Visitor) -> None:
     wait_until(lambda: view(keys.server)["compare"], "the page got the key")
 
 
+def test_space_plays_on_after_a_click_on_step(keys: Visitor) -> None:
+    keys.page.get_by_role("button", name="One scan back").click()
+    wait_until(lambda: keys.server.get("source")["state"] == "paused", "it is paused")
+    keys.page.keyboard.press(" ")
+    wait_until(lambda: keys.server.get("source")["state"] == "playing", "it plays")
+
+
 def test_typing_a_number_is_no_shortcut(keys: Visitor) -> None:
     keys.page.get_by_role("spinbutton", name="Min points").fill("")
     keys.page.keyboard.type("12")

@@ -90,6 +90,16 @@ def test_slam_is_switched_on_and_landmarks_appear(map_page: Visitor) -> None:
     assert number(page.inner_text("#pose-x").split("\u2009")[0]) == pytest.approx(now["pose"]["x"], abs=6e-4)
 
 
+def test_without_a_map_there_is_nothing_to_save_or_clear(mapped: Visitor) -> None:
+    page, server = mapped.page, mapped.server
+    clear, session = page.get_by_role("button", name="Clear"), server.get("localization")["session"]
+    expect(clear).to_be_enabled()
+    expect(page.locator("#map-save")).to_contain_text(f"Save map {session} as")
+    server.patch("settings", {"navigation": {"mode": "off"}})
+    expect(clear).to_be_disabled()
+    expect(page.locator("#map-save a")).to_have_count(0)
+
+
 def test_landmark_clicked_shows_its_covariance_and_history(mapped: Visitor) -> None:
     page, server = mapped.page, mapped.server
     wait_until(lambda: len(row_texts(page)) >= FEW, "landmarks are listed")
@@ -178,6 +188,23 @@ def drag(page: Page, start: NDArray[np.float64], end: NDArray[np.float64]) -> No
     page.mouse.move(*((start + end) / 2))
     page.mouse.move(*end)
     page.mouse.up()
+
+
+def test_one_click_in_the_scene_selects_the_landmark_and_the_corner_on_top_of_it(mapped: Visitor) -> None:
+    page, server = mapped.page, mapped.server
+    server.patch("source", {"state": "paused"})
+    mapped.fit()
+    to_world = world_of_pixels(mapped)
+    server.patch("settings", {"view": {"layers": None}})
+    seen = server.get("frame")["localization"]["innovations"]
+    wanted = next(row for row in landmarks(server) if row["id"] in {pair["landmark"] for pair in seen})
+    zero = to_world(np.zeros(2))
+    slope = to_world(np.ones(2)) - zero
+    box = page.locator("#scene").bounding_box()
+    page.mouse.click(*((np.array([wanted["x"], wanted["y"]]) - zero) / slope + [box["x"], box["y"]]))
+    wait_until(lambda: server.get("selection")["landmark"] == wanted["id"], "the landmark is selected")
+    wait_until(lambda: server.get("selection")["corner"] is not None, "the corner too")
+    expect(page.get_by_role("heading", name=f"Landmark L{wanted['id']}")).to_be_in_viewport()
 
 
 def test_setting_a_pose_is_given_up_by_escape_and_can_be_done_in_numbers(mapped: Visitor) -> None:
