@@ -1,7 +1,7 @@
 """What the filters have in common that a Navigator drives."""
 
 from dataclasses import replace
-from typing import Protocol
+from typing import Literal, Protocol
 
 from numpy.typing import ArrayLike
 
@@ -37,15 +37,18 @@ class Filter(Protocol):
     def restart_clock(self) -> None:
         """Take the next stamp and odometry as they come."""
 
+    def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
+        """Predict by this from now on, with the pose and the map as they are."""
+
     def displace(self, increment: Array, covariance: Array) -> None:
-        """Move by an increment (3,) seen from the sensor, with its covariance (3, 3), and restart the clock."""
+        """Move by an increment (3,) seen from the sensor, with its covariance (3, 3)."""
 
     def step(
         self,
         observed: Points,
         stamp: float,
         odometry: ArrayLike | None,
-        visible: Visible,
+        visible: Visible | None,
         times: Array | None,
     ) -> Estimate:
         """As Slam.step."""

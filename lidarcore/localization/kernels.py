@@ -14,11 +14,11 @@ wrap = inlined(wrapped)
 
 
 @kernel
-def odometry_variances(increment: Array, noise: Array) -> tuple[float, float, float]:
-    """Variances of an increment (3,) m, m, rad, in the sensor frame before the step, from OdometryNoise.table."""
+def odometry_variances(increment: Array, dt: float, noise: Array) -> tuple[float, float, float]:
+    """Variances of an increment (3,) m, m, rad over dt s, in the sensor frame before it, from OdometryNoise.table."""
     way, turn = np.hypot(increment[0], increment[1]), np.abs(increment[2])
-    slip = noise[4] ** 2 * turn
-    heading = noise[2] ** 2 * way + noise[3] ** 2 * turn
+    slip = noise[4] ** 2 * turn + noise[5] ** 2 * dt
+    heading = noise[2] ** 2 * way + noise[3] ** 2 * turn + noise[6] ** 2 * dt
     return noise[0] ** 2 * way + slip, noise[1] ** 2 * way + slip, heading
 
 

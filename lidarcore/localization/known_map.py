@@ -1,6 +1,7 @@
 """A known map that stays as it is, but for how often its landmarks are seen."""
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +28,12 @@ class KnownMap:
         self.map = landmarks.subset(landmarks.confirmed)
         self._localizer = Localizer(self.map.points, pose, covariance, settings)
         self._pose, self._covariance = np.asarray(pose, np.float64), np.asarray(covariance, np.float64)
-        self.reset, self.restart_clock = self._localizer.reset, self._localizer.restart_clock
+        self.restart_clock = self._localizer.restart_clock
+
+    def reset(self, pose: ArrayLike, covariance: ArrayLike) -> None:
+        """As Slam.reset."""
+        self._localizer.reset(pose, covariance)
+        self._pose, self._covariance = np.asarray(pose, np.float64), np.asarray(covariance, np.float64)
 
     def step(
         self,
@@ -57,5 +63,10 @@ class KnownMap:
     def displace(self, increment: Array, covariance: Array) -> None:
         """As Slam.displace."""
         pose, F, G = move(self._pose, increment)
-        self.reset(pose, F @ self._covariance @ F.T + G @ covariance @ G.T)
-        self.restart_clock()
+        self._pose, self._covariance = pose, F @ self._covariance @ F.T + G @ covariance @ G.T
+        self.reset(self._pose, self._covariance)
+
+    def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
+        """As Slam.drive_by."""
+        self._localizer.drive_by(motion)
+        self.settings = self._localizer.settings

@@ -1,5 +1,8 @@
 """Localization in a known map: the extended Kalman filter on one screen [EKF 14-26]."""
 
+from dataclasses import replace
+from typing import Literal
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -34,13 +37,19 @@ class Localizer:
     ) -> None:
         self.landmarks = landmarks
         self.settings = settings or LocalizationSettings()
-        self._motion = motion_model(self.settings)
+        self._motion = motion_model(self.settings, with_velocity=False)
         self._last: Instant | None = None
         self.reset(pose, covariance)
 
     def reset(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         """Start again from a pose (3,) and its covariance (3, 3), as from a relocalization."""
-        self._state, self._P = start(as_pose(pose, "pose"), covariance, self.settings)
+        self._state, self._P = start(as_pose(pose, "pose"), covariance, self.settings, self._motion.size)
+
+    def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
+        """Predict by this from now on, with the pose as it is."""
+        self.settings = replace(self.settings, motion=motion)
+        self._motion = motion_model(self.settings, with_velocity=False)
+        self.reset(self._state[:3], self._P[:3, :3])
 
     def restart_clock(self) -> None:
         """Take the next stamp and odometry as they come, after a clock or an encoder was reset."""

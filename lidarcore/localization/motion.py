@@ -73,13 +73,36 @@ def move(pose: Array, increment: Array) -> tuple[Array, Array, Array]:
 
 
 @kernel
-def _by_odometry(pose: Array, increment: Array, noise: Array) -> tuple[Array, Array, Array]:
-    """State, Jacobian and noise of an increment with the noise of OdometryNoise, as its table (5,)."""
+def _by_odometry(pose: Array, dt: float, increment: Array, noise: Array) -> tuple[Array, Array, Array]:
+    """State, Jacobian and noise of an increment over dt s with the noise of OdometryNoise, as its table (7,)."""
     moved, F, G = move(pose, increment)
-    ahead, across, turn = odometry_variances(increment, noise)
+    ahead, across, turn = odometry_variances(increment, dt, noise)
     c, s, Q = G[0, 0], G[1, 0], np.zeros((3, 3))
     Q[0, 0], Q[1, 1], Q[2, 2] = c * c * ahead + s * s * across, s * s * ahead + c * c * across, turn
     Q[0, 1] = Q[1, 0] = c * s * (ahead - across)
+    return moved, F, Q
+
+
+@kernel
+def _by_odometry_with_velocity(
+    state: Array, dt: float, increment: Array, noise: Array, rates: Array
+) -> tuple[Array, Array, Array]:
+    """State (6,), Jacobian and noise: the velocity is that of the increment, and so are its errors, over dt."""
+    pose, F_pose, Q_pose = _by_odometry(state[:3], dt, increment, noise)
+    moved, F, Q = np.concatenate((pose, state[3:])), np.eye(6), np.zeros((6, 6))
+    F[:3, :3], Q[:3, :3] = F_pose, Q_pose
+    if dt <= 0.0:
+        return moved, F, Q
+    variances = odometry_variances(increment, dt, noise)
+    c, s = np.cos(state[2]), np.sin(state[2])
+    for axis, row in ((0, 3), (1, 5), (2, 4)):  # ahead, sideways, turn
+        moved[row], F[row, row] = increment[axis] / dt, 0.0
+        Q[row, row] = variances[axis] / dt**2 + rates[row - 3] * dt
+    Q[0, 3], Q[1, 3], Q[2, 4] = c * variances[0] / dt, s * variances[0] / dt, variances[2] / dt
+    Q[0, 5], Q[1, 5] = -s * variances[1] / dt, c * variances[1] / dt
+    for i in range(3):
+        for j in range(3, 6):
+            Q[j, i] = Q[i, j]
     return moved, F, Q
 
 
@@ -120,8 +143,16 @@ def _at_constant_velocity(state: Array, dt: float, rates: Array) -> tuple[Array,
 
 
 @kernel
-def _advance_by_odometry(x: Array, P: Array, n: int, increment: Array, noise: Array) -> None:
-    state, F, Q = _by_odometry(x, increment, noise)
+def _advance_by_odometry(x: Array, P: Array, n: int, dt: float, increment: Array, noise: Array) -> None:
+    state, F, Q = _by_odometry(x, dt, increment, noise)
+    propagate(x, P, n, state, F, Q)
+
+
+@kernel
+def _advance_by_odometry_with_velocity(
+    x: Array, P: Array, n: int, dt: float, increment: Array, noise: Array, rates: Array
+) -> None:
+    state, F, Q = _by_odometry_with_velocity(x[:6], dt, increment, noise, rates)
     propagate(x, P, n, state, F, Q)
 
 
@@ -147,7 +178,7 @@ class Motion(Protocol):
 
 
 class OdometryMotion:
-    """State (x, y, heading): moves by what odometry says, with noise that grows with the way and the turn."""
+    """State (x, y, heading): moves by what odometry says, with noise that grows with the way, the turn and the time."""
 
     size = 3
 
@@ -156,15 +187,42 @@ class OdometryMotion:
 
     def predict(self, state: Array, dt: float, increment: Array | None) -> tuple[Array, Array, Array]:
         """Move by the increment (3,) m, m, rad in the sensor frame; without one the sensor stands."""
-        return _by_odometry(state, _STANDING if increment is None else increment, self._noise)
+        return _by_odometry(state, dt, _STANDING if increment is None else increment, self._noise)
 
     def advance(self, x: Array, P: Array, n: int, dt: float, increment: Array | None) -> None:
         """The same as predict, in place."""
-        _advance_by_odometry(x, P, n, _STANDING if increment is None else increment, self._noise)
+        _advance_by_odometry(x, P, n, dt, _STANDING if increment is None else increment, self._noise)
 
     def glide(self, state: Array, dt: float) -> tuple[Array, Array]:
         """Without a velocity the sensor stands."""
         return state, np.eye(3)
+
+
+class OdometryWithVelocity:
+    """State (x, y, heading, v, w, u): moves by what odometry says, and v, w, u are its increment over the time.
+
+    An error of the increment is one of the pose and of the velocity by which a scan is deskewed, so that what is seen
+    at a time of its own tells of both. Accelerations are those of the constant-velocity model.
+    """
+
+    size = 6
+
+    def __init__(self, noise: OdometryNoise, accelerations: VelocityNoise) -> None:
+        self._noise, self._rates = noise.table, _rates(accelerations)
+
+    def predict(self, state: Array, dt: float, increment: Array | None) -> tuple[Array, Array, Array]:
+        """Move by the increment (3,) m, m, rad in the sensor frame; without one the sensor stands."""
+        moved = _STANDING if increment is None else increment
+        return _by_odometry_with_velocity(state, dt, moved, self._noise, self._rates)
+
+    def advance(self, x: Array, P: Array, n: int, dt: float, increment: Array | None) -> None:
+        """The same as predict, in place."""
+        moved = _STANDING if increment is None else increment
+        _advance_by_odometry_with_velocity(x, P, n, dt, moved, self._noise, self._rates)
+
+    def glide(self, state: Array, dt: float) -> tuple[Array, Array]:
+        """Move along the arc of v, w and u."""
+        return _glide(state, dt)
 
 
 class ConstantVelocity:
@@ -176,7 +234,7 @@ class ConstantVelocity:
     size = 6
 
     def __init__(self, noise: VelocityNoise) -> None:
-        self._rates = np.square([noise.acceleration, noise.turn_acceleration, noise.sideways])
+        self._rates = _rates(noise)
 
     def predict(self, state: Array, dt: float, increment: Array | None) -> tuple[Array, Array, Array]:
         """Move along the arc of v, w and u; odometry is not used."""
@@ -191,15 +249,24 @@ class ConstantVelocity:
         _advance_at_constant_velocity(x, P, n, dt, self._rates)
 
 
-def motion_model(settings: LocalizationSettings) -> Motion:
-    """The model that the settings ask for."""
-    if settings.motion == "odometry":
-        return OdometryMotion(settings.odometry)
-    return ConstantVelocity(settings.velocity)
+def _rates(noise: VelocityNoise) -> Array:
+    """Variances (3,) by which v, w and u change in a second."""
+    return np.square([noise.acceleration, noise.turn_acceleration, noise.sideways])
 
 
-def start(pose: Array, covariance: ArrayLike, settings: LocalizationSettings) -> tuple[Array, Array]:
-    """State and covariance of the motion model at a pose (3,) with covariance (3, 3), standing as far as is known.
+def motion_model(settings: LocalizationSettings, *, with_velocity: bool) -> Motion:
+    """The model that the settings ask for; one with a velocity can deskew scans."""
+    if settings.motion == "constant velocity":
+        return ConstantVelocity(settings.velocity)
+    if with_velocity:
+        return OdometryWithVelocity(settings.odometry, settings.velocity)
+    return OdometryMotion(settings.odometry)
+
+
+def start(
+    pose: Array, covariance: ArrayLike, settings: LocalizationSettings, size: int
+) -> tuple[Array, Array]:
+    """State (size,) and covariance at a pose (3,) with covariance (3, 3), standing as far as is known.
 
     Raises CovarianceError if the covariance is not positive definite, LocalizationError if it is not (3, 3).
     """
@@ -209,7 +276,7 @@ def start(pose: Array, covariance: ArrayLike, settings: LocalizationSettings) ->
             f"The pose's covariance has shape {P.shape}: give that of x, y and heading, (3, 3)."
         )
     check_covariance(P, "The pose's covariance")
-    if settings.motion == "odometry":
+    if size == 3:
         return pose, P
     speed, turn_rate = settings.velocity.speed**2, settings.velocity.turn_rate**2
     full = np.diag([0.0, 0.0, 0.0, speed, turn_rate, speed if settings.velocity.sideways else 0.0])

@@ -1,5 +1,7 @@
 """One thing to drive: scans in, whereabouts out, in a known map or while building it."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -11,6 +13,7 @@ from lidarcore.localization.deskew import deskew, skew
 from lidarcore.localization.estimate import Estimate, Instant, as_pose, no_innovation
 from lidarcore.localization.filters import Filter, make_filter
 from lidarcore.localization.landmarks import Landmarks
+from lidarcore.localization.map_origin import MapOrigin
 from lidarcore.localization.motion import start
 from lidarcore.localization.points import Points
 from lidarcore.localization.reckoning import DeadReckoning, Velocity
@@ -25,10 +28,13 @@ from lidarcore.scan import Array, Scan
 
 _ORIGIN = 1e-6 * np.eye(3)
 _NOWHERE = np.diag([10.0, 10.0, np.pi]) ** 2  # m², m², rad²: covariance of a pose of which nothing is known
+_STRAY = (
+    0.1  # m that a gap may hide of the way, more than which landmarks could be taken for their neighbours
+)
 _DOUBT = 25.0  # the covariance of a pose found from a scan grows so much before the same scan corrects it
-_LATE = 10  # scans within which odometry may come: some recordings begin before it
 _RECOGNISABLE = 4  # confirmed landmarks, without which no pose is found in a map
 _NOTHING = Landmarks.of(Points(np.empty((0, 2)), np.eye(2)))
+_MISSING = "Odometry is missing: the pose is predicted at constant velocity."
 _MESSAGES = {
     "coasting": "No landmark is recognised: the pose is only predicted.",
     "lost": "The pose is not to be trusted any more: it is looked for in the map.",
@@ -63,9 +69,10 @@ class Navigator:
         self._filter: Filter | None = None
         self._start: tuple[Array, Array]
         self._estimate: Estimate
-        self._scans = 0
+        self._continuity, self._origin = Continuity(), MapOrigin()
         self._watch, self._reckoning = Watch(), DeadReckoning()
         self._state: State = "starting"
+        self._strayed = False  # in a gap: which landmark is which is to be made sure of first
         self._deskewed: tuple[float, Velocity] = (np.nan, (0.0, 0.0, 0.0))  # stamp, and what was taken out
         self._is_placed = pose is not None or len(self._given) == 0
         nowhere = _ORIGIN if self._is_placed else _NOWHERE
@@ -74,6 +81,11 @@ class Navigator:
     @property
     def landmarks(self) -> Landmarks:
         """The map as it is now."""
+        return self._origin.landmarks(self._map)
+
+    @property
+    def _map(self) -> Landmarks:
+        """The same in the frame that it was begun in."""
         return self._given if self._filter is None else self._filter.map
 
     def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
@@ -86,7 +98,7 @@ class Navigator:
             self._filter.reset(*self._start)
             self._filter.restart_clock()
         self._reckoning.place(self._estimate.pose)
-        self._is_placed = True
+        self._is_placed, self._strayed = True, False
         self._watch.restart()
 
     def deskewed(self, scan: Scan) -> Scan:
@@ -100,6 +112,11 @@ class Navigator:
         self._deskewed = scan.stamp, velocity
         return deskew(scan, *velocity)
 
+    @property
+    def deskewed_by(self) -> tuple[float, Velocity]:
+        """Stamp of the scan that was deskewed last, NaN if none was, and the velocity that was taken out of it."""
+        return self._deskewed
+
     def step(
         self,
         scan: Scan,
@@ -110,24 +127,25 @@ class Navigator:
         """Take one scan with what was found in it; odometry is T_odom_sensor (3,), by default that of the scan.
 
         A scan whose clock went back, or whose odometry is missing, not finite or has jumped, is left out, and the
-        message says so; once a few agree with each other it goes on from the new values.
+        message says so; once a few agree with each other it goes on from the new values, or without odometry.
         Raises LocalizationError if the settings ask for clusters and there are none.
         """
         sightings = Sightings.of(scan, features, clusters, self.settings)
         odometry = scan.odometry if odometry is None else odometry
-        before = self.landmarks
+        before = self._map
         try:
             now = Instant(scan.stamp, None if odometry is None else np.asarray(odometry, np.float64))
             message = self._advance(now, sightings, scan, before)
         except LocalizationError as error:
             message = f"{_fact(error)}: the scan was left out."
             self._estimate = self._estimate.unmoved(len(sightings.points))
+            self._coast(before)
         return Whereabouts.of(
             scan.stamp,
             self.mode,
             self._state,
             message,
-            self._estimate,
+            self._origin.estimate(self._estimate),
             sightings.points,
             before,
             self.landmarks,
@@ -137,38 +155,40 @@ class Navigator:
     def _advance(self, now: Instant, sightings: Sightings, scan: Scan, before: Landmarks) -> str | None:
         """Step the filter, across a break of clock or odometry if need be; what is to be said about it."""
         running, message = self._running(now), None
+        if (hidden := self._continuity.hidden(now, running.settings)) is not None:
+            running.displace(np.zeros(3), hidden)
+            known = np.count_nonzero(before.confirmed)
+            self._strayed |= bool(known >= _RECOGNISABLE and np.trace(hidden[:2, :2]) > _STRAY**2)
         if not self._is_placed and (trouble := self._find(running, sightings.points, before)):
             pose, seen = self._estimate.pose, len(sightings.points)
             self._estimate = Estimate(now.stamp, pose, _NOWHERE, None, no_innovation(seen))
             self._reckoning.carry(now, pose)
             return trouble
         try:
+            self._continuity.check(now)
             estimate = self._estimated(running, now, sightings, scan)
         except MotionError as error:
-            bridge = self._continuity.reject(now)
+            bridge = self._continuity.reject(now, running.settings)
             if bridge is None:
                 raise
             running.displace(bridge.increment, bridge.covariance)
+            running.restart_clock()
             self._reckoning.interrupt()
             estimate = self._estimated(running, now, sightings, scan)
             message = f"{_fact(error)}: it goes on from the new values."
         self._continuity.accept(now)
         self._reckoning.carry(now, estimate.pose)
         self._estimate = estimate
-        return self._judge(running, before) or message
+        return self._judge(running, before) or message or self._about_odometry(running)
 
     def _running(self, now: Instant) -> Filter:
-        """The filter; made at the first scan, and again if odometry comes soon after."""
-        has_odometry = now.odometry is not None
-        if self._filter is None or (
-            has_odometry
-            and self._scans < _LATE
-            and self.settings.motion == "auto"
-            and self._filter.settings.motion != "odometry"
-        ):
-            self._filter = make_filter(self.settings, has_odometry, *self._start, self._given)
-            self._continuity = Continuity(self._filter.settings)
-        self._scans += 1
+        """The filter, made at the first scan; moved by odometry if there is any and the settings allow."""
+        if self._filter is None:
+            self._filter = make_filter(self.settings, now.odometry is not None, *self._start, self._given)
+        used = self._filter.settings.motion
+        motion = self._continuity.motion(now, used)
+        if self.settings.motion != "constant velocity" and motion != used:
+            self._filter.drive_by(motion)
         return self._filter
 
     def _find(self, running: Filter, observed: Points, known: Landmarks) -> str | None:
@@ -189,21 +209,42 @@ class Navigator:
     def _estimated(self, running: Filter, now: Instant, sightings: Sightings, scan: Scan) -> Estimate:
         """One step of the filter with what was seen, as it was seen."""
         points, times = sightings.points, sightings.times
-        if running.settings.motion == "odometry":
-            times = None  # it has no velocity that could be corrected
-            if scan.beam_times is not None and self._velocity(scan) is None:
-                points = points.subset(np.zeros(len(points), np.bool_))  # who knows how distorted they are
+        if running.settings.motion == "odometry" and scan.beam_times is not None and not self._velocity(scan):
+            points, times = (
+                points.subset(np.zeros(len(points), np.bool_)),
+                None,
+            )  # who knows how distorted they are
+        if self._strayed:
+            return self._made_sure(running, now, points)
         if times is not None:
             stamp, velocity = self._deskewed
             points = skew(points, times, *(velocity if stamp == scan.stamp else (0.0, 0.0, 0.0)))
         return running.step(points, now.stamp, now.odometry, Visibility(scan), times)
+
+    def _made_sure(self, running: Filter, now: Instant, seen: Points) -> Estimate:
+        """After a gap: predict, and look for the pose by several landmarks at once, near where it should be.
+
+        One landmark alone may be taken for its neighbour.
+        """
+        nothing = seen.subset(np.zeros(len(seen), np.bool_))
+        predicted = running.step(nothing, now.stamp, now.odometry, None, None)
+        known, near = running.map, (predicted.pose, predicted.covariance)
+        try:
+            found = relocalize(seen, known.subset(known.confirmed).points, near=near)
+        except LostError:
+            return predicted.unmoved(len(seen))
+        self._strayed = False
+        running.reset(found.pose, _DOUBT * found.covariance)
+        return replace(predicted, pose=found.pose, covariance=_DOUBT * found.covariance).unmoved(len(seen))
 
     def _judge(self, running: Filter, before: Landmarks) -> str | None:
         """Set the state after a step; what is to be said about it."""
         state = self._watch.judge(self._estimate, running.is_at_odds)
         known = np.count_nonzero(before.confirmed)
         if state == "lost" and known < _RECOGNISABLE and isinstance(running, Slam):
+            self._origin = MapOrigin(self._estimate.pose, self._origin.estimate(self._estimate).covariance)
             running.start_over(self._estimate.pose, _ORIGIN)
+            self._estimate = replace(self._estimate, covariance=_ORIGIN)
             self._watch.restart()
             self._state = "starting"
             return "There are too few landmarks to keep the pose: a new map is begun."
@@ -213,15 +254,31 @@ class Navigator:
         self._is_placed = state != "lost"
         return _MESSAGES.get(state)
 
+    def _coast(self, before: Landmarks) -> None:
+        """After too many scans that were left out: who knows where the sensor goes meanwhile."""
+        if self._filter is None or not self._is_placed or not self._continuity.is_broken:
+            return
+        drift = self._continuity.drift(self._filter.settings)
+        self._filter.displace(np.zeros(3), drift)
+        self._estimate = replace(self._estimate, covariance=self._estimate.covariance + drift)
+        self._judge(self._filter, before)
+
+    def _about_odometry(self, running: Filter) -> str | None:
+        """What is to be said if there should be odometry."""
+        expected = self.settings.motion == "odometry" or (
+            self.settings.motion == "auto" and self._reckoning.pose is not None
+        )
+        return _MISSING if expected and running.settings.motion != "odometry" else None
+
     def _velocity(self, scan: Scan) -> Velocity | None:
-        """As the filter or else odometry has it."""
-        if self._estimate.velocity is None:
+        """As odometry has it, if that moves the filter, else as the filter has it."""
+        if self._estimate.velocity is None or (self._filter and self._filter.settings.motion == "odometry"):
             return self._reckoning.velocity(scan)
         v, w = self._estimate.velocity.tolist()
         return v, w, self._estimate.sideways
 
     def _set_start(self, pose: ArrayLike, covariance: ArrayLike) -> None:
-        self._start = start(as_pose(pose, "pose"), covariance, LocalizationSettings())
+        self._start = start(as_pose(pose, "pose"), covariance, LocalizationSettings(), 3)
         self._estimate = Estimate(0.0, *self._start, None, no_innovation(0))
 
 

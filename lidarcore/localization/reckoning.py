@@ -4,6 +4,7 @@ from lidarcore.localization.estimate import Instant
 from lidarcore.poses import compose, inverse
 from lidarcore.scan import Array, Scan
 
+_LONG = 1.0  # s, over which an increment does not tell the velocity at its end
 Velocity = tuple[float, float, float]  # m/s ahead, rad/s, m/s to the left
 
 
@@ -38,7 +39,7 @@ class DeadReckoning:
         if self._last is None or self._last.odometry is None or scan.odometry is None:
             return None
         dt = scan.stamp - self._last.stamp
-        if dt <= 0:
+        if not 0 < dt <= _LONG:
             return None
         x, y, turn = (compose(inverse(self._last.odometry), scan.odometry) / dt).tolist()
         return x, turn, y

@@ -16,10 +16,15 @@ from lidarcore.localization.points import Points
 from lidarcore.poses import wrap
 from lidarcore.scan import Array, Ints
 
+_FAR = 6.0  # standard deviations; what is known of a pose after a gap is rough
 _SIGMAS = 4.0
 _PAIRS = 12  # observed pairs to try, the longest ones: they fix the heading best
 _SAME = np.array([0.3, 0.3, 0.2])  # m, m, rad: poses nearer than this are one
 _ROUNDS = 4
+_MOST_PAIRS = 4_000_000  # of landmarks, within the longest distance seen
+_MOST_POSES = 50_000  # hypotheses that are compared with the whole scan
+_MOST_REFINED = 100  # hypotheses, the best ones, of which least squares are worth it
+_TOO_LARGE = "The map of {} landmarks is too large to be searched at once: say where the sensor is."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,24 +36,37 @@ class Relocation:
     pairs: Ints
 
 
-def relocalize(observed: Points, landmarks: Points, min_pairs: int = 4) -> Relocation:
+def relocalize(
+    observed: Points, landmarks: Points, min_pairs: int = 4, near: tuple[Array, Array] | None = None
+) -> Relocation:
     """Find the one pose from which the landmarks of the map explain min_pairs of the points seen, and half of them.
 
-    Raises LostError if there is none, or several explain as much: a symmetric room, or too few points.
+    near, if given, are a pose (3,) and a covariance (3, 3): only poses within some of its standard deviations count.
+    Raises LostError if there is none, or several explain as much: a symmetric room, or too few points; or if the map
+    is too large to be searched.
     """
     found: list[Relocation] = []
-    min_pairs = max(min_pairs, (len(observed) + 1) // 2)
+    _check(observed, landmarks, min_pairs)
+    min_pairs, refined = max(min_pairs, (len(observed) + 1) // 2), 0
     if min(len(observed), len(landmarks)) < min_pairs:
         raise _unexplained(min_pairs, observed)
-    poses, tree = _hypotheses(observed, landmarks), cKDTree(landmarks.xy)
+    tree = cKDTree(landmarks.xy)
+    poses = _hypotheses(observed, landmarks, tree)
+    poses = poses if near is None else poses[_are_near(poses, *near)]
     counts = _counts(poses, observed, landmarks, tree)
-    for pose in poses[np.argsort(-counts, kind="stable")[: np.sum(counts >= min_pairs)]]:
+    for index in np.argsort(-counts, kind="stable")[: np.sum(counts >= min_pairs)]:
+        pose = poses[index]
+        if found and counts[index] < max(len(known.pairs) for known in found):
+            break
         if not any(_same(pose, known.pose) for known in found):
+            if refined == _MOST_REFINED:
+                raise LostError(
+                    f"More than {refined} poses explain about as much of the scan: say where the sensor is."
+                )
+            refined += 1
             candidate = _refine(pose, observed, landmarks, tree)
             if candidate and not any(_same(candidate.pose, known.pose) for known in found):
                 found.append(candidate)
-        if len(found) > 1 and len(found[-1].pairs) < len(found[0].pairs):
-            break
     found.sort(key=lambda relocation: -len(relocation.pairs))
     if not found or len(found[0].pairs) < min_pairs:
         raise _unexplained(min_pairs, observed)
@@ -60,22 +78,62 @@ def relocalize(observed: Points, landmarks: Points, min_pairs: int = 4) -> Reloc
     return found[0]
 
 
-def _hypotheses(observed: Points, landmarks: Points) -> Array:
-    """Poses (H, 3) that bring two observed points onto two landmarks of their kinds."""
-    spacing = np.linalg.norm(landmarks.xy[:, None] - landmarks.xy, axis=-1)
-    lengths = np.linalg.norm(observed.xy[:, None] - observed.xy, axis=-1)
+def _are_near(poses: Array, pose: Array, covariance: Array) -> NDArray[np.bool_]:
+    """(H,) true for the poses within _FAR standard deviations of a pose."""
+    away = poses - pose
+    away[:, 2] = wrap(away[:, 2])
+    squared: Array = np.einsum("hi,ij,hj->h", away, np.linalg.inv(covariance), away)
+    return squared < _FAR**2
+
+
+def _check(observed: Points, landmarks: Points, needed: int) -> None:
+    """Raise LostError if no scan like this one could tell the pose in this map."""
+    if len(landmarks) < needed:
+        raise LostError(
+            f"The map has {len(landmarks)} landmarks, and {needed} are needed to find a pose in it: "
+            "say where the sensor is, or map more."
+        )
+    seen, known = set(np.asarray(observed.kinds).tolist()), set(np.asarray(landmarks.kinds).tolist())
+    if seen and not seen & known:
+        raise LostError(
+            f"The map holds no {' or '.join(sorted(seen))} but {', '.join(sorted(known))}: "
+            "take those for landmarks, or give another map."
+        )
+
+
+def _hypotheses(observed: Points, landmarks: Points, tree: cKDTree) -> Array:
+    """Poses (H, 3) that bring two observed points onto two landmarks of their kinds, the rarest pairs first."""
     i, j = np.triu_indices(len(observed), 1)
+    lengths = np.linalg.norm(observed.xy[i] - observed.xy[j], axis=-1)
+    longest = np.argsort(-lengths)[:_PAIRS]
+    i, j, lengths = i[longest], j[longest], lengths[longest]
+    variances = np.trace(observed.covariance, axis1=1, axis2=2)
+    tolerance = _SIGMAS * np.sqrt(variances[i] + variances[j])
+    a, b, spacing = _spacings(landmarks.xy, tree, float((lengths + tolerance).max()))
+    first, last = np.searchsorted(spacing, [lengths - tolerance, lengths + tolerance])
     kinds, known = np.asarray(observed.kinds), np.asarray(landmarks.kinds)
-    poses = [np.empty((0, 3))]
-    for pair in np.argsort(-lengths[i, j])[:_PAIRS]:
-        first, second = i[pair], j[pair]
-        spread = np.sqrt(np.trace(observed.covariance[first] + observed.covariance[second]))
-        alike = np.abs(spacing - lengths[first, second]) < _SIGMAS * spread
-        alike &= (known == kinds[first])[:, None] & (known == kinds[second])
-        np.fill_diagonal(alike, False)
-        a, b = np.nonzero(alike)
-        poses.append(_onto(observed.xy[[first, second]], landmarks.xy[a], landmarks.xy[b]))
+    poses, count = [np.empty((0, 3))], 0
+    for pair in np.argsort(last - first):
+        count += 2 * int(last[pair] - first[pair])
+        if count > _MOST_POSES:
+            break
+        alike = slice(first[pair], last[pair])
+        ends = np.array([[a[alike], b[alike]], [b[alike], a[alike]]]).transpose(1, 0, 2).reshape(2, -1)
+        ends = ends[:, (known[ends] == kinds[[i[pair], j[pair]]][:, None]).all(axis=0)]
+        poses.append(_onto(observed.xy[[i[pair], j[pair]]], *landmarks.xy[ends]))
+    if len(poses) == 1:
+        raise LostError(_TOO_LARGE.format(len(landmarks)))
     return np.concatenate(poses)
+
+
+def _spacings(xy: Array, tree: cKDTree, longest: float) -> tuple[Ints, Ints, Array]:
+    """Pairs of landmarks (S,), (S,) that are not farther apart than the longest distance, and how far (S,), rising."""
+    if tree.count_neighbors(tree, longest) > 2 * _MOST_PAIRS + len(xy):
+        raise LostError(_TOO_LARGE.format(len(xy)))
+    a, b = tree.query_pairs(longest, output_type="ndarray").T
+    spacing = np.linalg.norm(xy[a] - xy[b], axis=-1)
+    rising = np.argsort(spacing)
+    return a[rising], b[rising], spacing[rising]
 
 
 def _onto(points: Array, start: Array, end: Array) -> Array:

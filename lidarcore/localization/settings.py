@@ -32,17 +32,29 @@ class OdometryNoise:
     slip_per_radian: Annotated[
         float, _number(0, 1, "m/√rad", "standard deviation of the position after turning one radian")
     ] = 0.01
+    unseen: Annotated[
+        float,
+        _number(0, 1, "m/√s", "standard deviation of the position after a second that wheels do not tell of"),
+    ] = 0.002
+    unseen_turn: Annotated[
+        float, _number(0, 1, "rad/√s", "standard deviation of the heading after a second, the same")
+    ] = 0.002
 
     @property
     def table(self) -> Array:
-        """(5,) the numbers as kernels take them."""
-        return np.array(
-            [self.along, self.across, self.heading_per_metre, self.heading_per_radian, self.slip_per_radian]
-        )
+        """(7,) the numbers as kernels take them."""
+        ways = [
+            self.along,
+            self.across,
+            self.heading_per_metre,
+            self.heading_per_radian,
+            self.slip_per_radian,
+        ]
+        return np.array([*ways, self.unseen, self.unseen_turn])
 
-    def covariance(self, increment: Array) -> Array:
-        """Covariance (3, 3) of an increment (3,) m, m, rad, in the sensor frame before the step."""
-        return np.diag(odometry_variances(np.asarray(increment, np.float64), self.table))
+    def covariance(self, increment: Array, dt: float = 0.0) -> Array:
+        """Covariance (3, 3) of an increment (3,) m, m, rad over dt s, in the sensor frame before the step."""
+        return np.diag(odometry_variances(np.asarray(increment, np.float64), dt, self.table))
 
 
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,8 +49,9 @@ class Slam:
         landmarks: Landmarks | None = None,
     ) -> None:
         self.settings = settings or LocalizationSettings()
-        self._motion = motion_model(self.settings)
+        self._motion = motion_model(self.settings, with_velocity=True)
         d = self._motion.size
+        self._unknown_velocity = start(np.zeros(3), _ORIGIN, self.settings, d)[1][3:, 3:]
         self._joint, self._register = JointState(np.zeros(d), np.zeros((d, d))), Register(self.settings)
         if landmarks is not None and len(landmarks):
             self._joint.add(landmarks.points.xy, landmarks.points.covariance)
@@ -81,8 +84,13 @@ class Slam:
 
     def reset(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         """Go on from a pose (3,) with covariance (3, 3) that are independent of the map, as when placed by hand."""
-        state, P = start(as_pose(pose, "pose"), covariance, self.settings)
+        state, P = start(as_pose(pose, "pose"), covariance, self.settings, self._motion.size)
         self._joint.predict(state, np.zeros((len(state), len(state))), P)
+
+    def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
+        """Predict by this from now on, with the pose, its velocity and the map as they are."""
+        self.settings = replace(self.settings, motion=motion)
+        self._motion = motion_model(self.settings, with_velocity=True)
 
     def start_over(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         """Begin a new map from a pose (3,) with covariance (3, 3); ids go on."""
@@ -96,13 +104,13 @@ class Slam:
         self._last = None
 
     def displace(self, increment: Array, covariance: Array) -> None:
-        """Move by an increment (3,) seen from the sensor, with its covariance (3, 3), and restart the clock."""
+        """Move by an increment (3,) seen from the sensor, with its covariance (3, 3)."""
         state = self._joint.state.copy()
         F, Q = np.eye(len(state)), np.zeros((len(state), len(state)))
         state[:3], F[:3, :3], G = move(state[:3], increment)
         Q[:3, :3] = G @ covariance @ G.T
+        F[3:, 3:], Q[3:, 3:] = 0.0, self._unknown_velocity  # whatever it is by now
         self._joint.predict(state, F, Q)
-        self.restart_clock()
 
     def step(
         self,

@@ -74,7 +74,7 @@ def float_and_map(rng: np.random.Generator) -> list[float]:
 
     The first landmarks are tentative and correct the pose, for there are no others.
     """
-    motion, noise = motion_model(FREE), FREE.velocity
+    motion, noise = motion_model(FREE, with_velocity=True), FREE.velocity
     start = np.array([6.0, 2.5, 0.3])
     state = np.append(start, rng.normal(0, [noise.speed, noise.turn_rate, noise.speed]))
     slam, errors = Slam(FREE, rng.multivariate_normal(start, START_COVARIANCE), START_COVARIANCE), []

@@ -1,10 +1,11 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numeric import jacobian
 
 from lidarcore.localization.measurement import to_sensor, to_world
-from lidarcore.localization.motion import ConstantVelocity, OdometryMotion, arc, move
+from lidarcore.localization.motion import ConstantVelocity, OdometryMotion, OdometryWithVelocity, arc, move
 from lidarcore.localization.settings import OdometryNoise, VelocityNoise
 from lidarcore.scan import Array
 
@@ -109,7 +110,27 @@ def test_odometry_noise_of_a_straight_way_does_not_depend_on_how_it_is_cut(
     model = OdometryMotion(OdometryNoise())
     state, P = np.zeros(3), np.zeros((3, 3))
     for _ in range(steps):
-        state, F, Q = model.predict(state, 0.1, np.array([way / steps, 0, 0]))
+        state, F, Q = model.predict(state, 0.1 / steps, np.array([way / steps, 0, 0]))
         P = F @ P @ F.T + Q
     _, _, whole = model.predict(np.zeros(3), 0.1, np.array([way, 0, 0]))
     np.testing.assert_allclose([P[0, 0], P[2, 2]], [whole[0, 0], whole[2, 2]], rtol=1e-9)
+
+
+@pytest.mark.parametrize("turned", [-0.12, 0.0, 0.12])
+def test_an_error_of_odometry_is_one_of_the_pose_and_of_the_velocity(turned: float) -> None:
+    """The covariance of a step against that of a hundred thousand increments drawn from the noise."""
+    noise, accelerations, dt = OdometryNoise(), VelocityNoise(), 0.1
+    increment, rng = np.array([0.08, 0.01, turned]), np.random.default_rng(4)
+    model = OdometryWithVelocity(noise, accelerations)
+    start = np.array([1.0, 2.0, 0.7, 9.0, 9.0, 9.0])
+    _, F, Q = model.predict(start, dt, increment)
+    drawn = rng.multivariate_normal(increment, noise.covariance(increment, dt), 100_000)
+    ends = np.array([move(start[:3], moved)[0] for moved in drawn])
+    velocities = drawn[:, [0, 2, 1]] / dt
+    changes = rng.normal(size=velocities.shape) * np.sqrt(
+        dt * np.square([accelerations.acceleration, accelerations.turn_acceleration, accelerations.sideways])
+    )
+    expected = np.cov(np.hstack([ends, velocities + changes]).T)
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(Q / scale, expected / scale, atol=0.02)
+    np.testing.assert_array_equal(F[3:], 0.0)
