@@ -179,7 +179,7 @@ class Navigator:
         self._continuity.accept(now)
         self._reckoning.carry(now, estimate.pose)
         self._estimate = estimate
-        return self._judge(running, before) or message or self._about_odometry(running)
+        return self._judge(running, before) or message or self._about_odometry(running, now)
 
     def _running(self, now: Instant) -> Filter:
         """The filter, made at the first scan; moved by odometry if there is any and the settings allow."""
@@ -263,12 +263,14 @@ class Navigator:
         self._estimate = replace(self._estimate, covariance=self._estimate.covariance + drift)
         self._judge(self._filter, before)
 
-    def _about_odometry(self, running: Filter) -> str | None:
+    def _about_odometry(self, running: Filter, now: Instant) -> str | None:
         """What is to be said if there should be odometry."""
         expected = self.settings.motion == "odometry" or (
             self.settings.motion == "auto" and self._reckoning.pose is not None
         )
-        return _MISSING if expected and running.settings.motion != "odometry" else None
+        return (
+            _MISSING if expected and now.odometry is None and running.settings.motion != "odometry" else None
+        )
 
     def _velocity(self, scan: Scan) -> Velocity | None:
         """As odometry has it, if that moves the filter, else as the filter has it."""

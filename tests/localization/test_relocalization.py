@@ -5,6 +5,7 @@ from walks import POSTS, nees, sight, sighting, true_path
 
 from lidarcore.errors import LostError
 from lidarcore.localization import Localizer, Points
+from lidarcore.localization.measurement import to_sensor
 from lidarcore.localization.relocalization import relocalize
 
 MAP = Points(POSTS, 1e-6 * np.eye(2), "post")
@@ -52,3 +53,32 @@ def test_a_lost_localizer_goes_on_from_where_it_was_found() -> None:
     estimate = localizer.step(sighting(rng, pose, POSTS[sight(pose)]), 0.1, pose)
     assert not estimate.coasting
     np.testing.assert_allclose(estimate.pose, pose, atol=0.06)
+
+
+@pytest.mark.parametrize(("count", "size"), [(2000, 100.0), (20_000, 400.0), (5000, 30.0)])
+def test_in_a_map_of_thousands_the_pose_is_found(count: int, size: float) -> None:
+    rng = np.random.default_rng(count)
+    landmarks, pose = rng.uniform(0, size, (count, 2)), np.array([size / 2, size / 3, 1.0])
+    near = np.argsort(np.hypot(*(landmarks - pose[:2]).T))[:12]
+    z, _, _ = to_sensor(pose, landmarks[near])
+    seen = Points(z + rng.normal(0, 0.01, z.shape), 1e-4 * np.eye(2))
+    found = relocalize(seen, Points(landmarks, 1e-6 * np.eye(2)))
+    assert nees(found.pose - pose, found.covariance) < chi2.ppf(0.999, 3)
+
+
+@pytest.mark.parametrize("size", [50.0, 1000.0])
+def test_a_map_too_large_to_be_searched_is_refused(size: float) -> None:
+    """A hundred thousand landmarks, crowded or not: the distances between all of them would fill 80 gigabytes."""
+    rng = np.random.default_rng(3)
+    landmarks = Points(rng.uniform(0, size, (100_000, 2)), 1e-4 * np.eye(2))
+    seen = Points(rng.uniform(-4, 4, (12, 2)), 1e-4 * np.eye(2))
+    with pytest.raises(LostError, match="100000 landmarks is too large to be searched at once: say where"):
+        relocalize(seen, landmarks)
+
+
+def test_a_map_of_too_few_landmarks_or_of_other_kinds_is_named() -> None:
+    seen = sighting(np.random.default_rng(0), np.array([2.0, 1.0, 0.3]), POSTS[:6])
+    with pytest.raises(LostError, match="The map has 3 landmarks, and 4 are needed"):
+        relocalize(seen, MAP.subset(np.arange(3)))
+    with pytest.raises(LostError, match="The map holds no post but corner"):
+        relocalize(seen, Points(POSTS, 1e-6 * np.eye(2), "corner"))
