@@ -21,6 +21,13 @@ MUTATIONS = [
     ("POST", "/emulator", {"command": "unplug"}),
     ("PUT", "/recordings/new.npz", {}),
     ("DELETE", "/recordings/room.npz", None),
+    ("POST", "/pose", {"x": 1, "y": 1, "heading": 0}),
+    ("POST", "/odometry", {"stamp": 1, "x": 1, "y": 1, "heading": 0}),
+    ("POST", "/localization/reset", None),
+    ("PUT", "/localization/map", {"session": None}),
+    ("POST", "/map", {"format": "lidarcore landmarks"}),
+    ("DELETE", "/landmarks", None),
+    ("DELETE", "/sessions/1", None),
 ]
 WEBSOCKETS = [("/api/v1/stream", None), ("/viser", ["viser-v1.1.1"])]
 
@@ -45,7 +52,10 @@ def test_every_mutating_route_is_covered_by_these_tests(shared_server: Server) -
     routes = {(m.upper(), path) for path, methods in paths.items() for m in methods if m != "get"}
     names = {f"/api/v1{path}": method for method, path, _ in MUTATIONS}
     assert len(routes) == len(names) + 1  # PUT and PATCH of /source
-    assert all(path.replace("{name}", "new.npz") in names or "{name}" in path for _, path in routes)
+    assert all(
+        path.replace("{name}", "new.npz").replace("{id}", "1") in names or "{name}" in path
+        for _, path in routes
+    )
 
 
 @pytest.mark.parametrize(("path", "protocols"), WEBSOCKETS)
