@@ -54,7 +54,9 @@ def mapped(map_page: Visitor) -> Visitor:
     map_page.page.get_by_role("tab", name="Map").click()
     map_page.server.patch("settings", {"view": None, "clusters": None})
     map_page.server.emulate()
-    map_page.server.api.post("localization/reset").raise_for_status()  # poses were set by hand in the map before
+    map_page.server.api.post(
+        "localization/reset"
+    ).raise_for_status()  # poses were set by hand in the map before
     slam(map_page.server)
     return map_page
 
