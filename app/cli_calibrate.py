@@ -33,7 +33,7 @@ def calibrate(
     """The noise of a sensor from a recording made while it stood still in a room."""
     from rich.console import Console
 
-    from lidarcore import open_recording
+    from lidarcore import files, open_recording
     from lidarcore.evaluation.calibration import calibrate as run
 
     taken = islice(open_recording(recording, topic), skip, None if scans is None else skip + scans)
@@ -46,7 +46,7 @@ def calibrate(
     )
     if output is not None:
         noise = {"sigma_range": found.noise.sigma_range, "sigma_bearing": found.noise.sigma_bearing}
-        output.write_text(json.dumps({"extraction": {"noise": noise}}, indent=1) + "\n", "utf-8")
+        files.write(output, json.dumps({"extraction": {"noise": noise}}, indent=1) + "\n")
 
 
 def _table(found: "Calibration") -> "Table":

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli_options import Topic, end_like_ctrl_c
+from lidarcore.files import write
 
 if TYPE_CHECKING:
     from lidarcore import Scan
@@ -72,7 +73,7 @@ def cwlf(
     design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
     with _progress(paper.PARTS) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    output.write_text(html(result), "utf-8")
+    write(output, html(result))
     _tell(output, claims(result))
 
 
@@ -99,7 +100,7 @@ def wctls(
     design = _design(whole, scans, sigma_range, sigma_bearing, quick)
     with _progress(paper.PARTS) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    output.write_text(html(result), "utf-8")
+    write(output, html(result))
     _tell(output, claims(result))
 
 
@@ -123,7 +124,7 @@ def clustering_ekf(
         design = design.quick()
     with _progress(design.runs * len(paper.TRAJECTORIES)) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, done)
-    output.write_text(html(result), "utf-8")
+    write(output, html(result))
     typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
 
 

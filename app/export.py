@@ -1,8 +1,7 @@
 """A whole recording's segments and corners into one table: CSV, Parquet or GeoJSON by the file's suffix."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -14,6 +13,7 @@ import pyarrow.parquet
 
 from app.tables import corner_columns, segment_columns
 from lidarcore import ExtractionSettings, Features, RecordingError, Scan, compare
+from lidarcore.files import replacing
 from lidarcore.recordings import Recording
 
 BATCH = 200  # scans written at once
@@ -134,17 +134,6 @@ def process(
                 batch = _Batch()
         writer.write(batch.table())
     return counts
-
-
-@contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """A file beside the path that takes its place at the end, or goes away if something fails."""
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        yield partial
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _feature(row: dict[str, Any]) -> dict[str, Any]:

@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
-from app.export import replacing
 from app.settings import Settings
 from app.tables import csv_text
 from lidarcore import RecordingError, Scan, extract
 from lidarcore.clusters import cluster
+from lidarcore.files import replacing, write
 from lidarcore.landmarks import FORMATS, read_landmarks, write_landmarks
 from lidarcore.localization import Landmarks, Navigator, Points, Whereabouts, from_stored, to_stored
 from lidarcore.recordings import Recording
@@ -81,8 +81,7 @@ def write_map(path: Path, landmarks: Landmarks, method: str) -> None:
 
 def write_poses(path: Path, outcome: Outcome) -> None:
     """The poses as CSV; the file appears when complete."""
-    with replacing(path) as partial:
-        partial.write_text(csv_text(outcome.columns), "utf-8", newline="")
+    write(path, csv_text(outcome.columns))
 
 
 def format_of(path: Path) -> str:

@@ -9,14 +9,11 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass
 
+from lidarcore.fields import number
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise
 
 Covariance = Literal["consistent", "published"]
-
-
-def _metres(low: float, high: float, text: str) -> object:
-    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": "m"})
 
 
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
@@ -33,24 +30,26 @@ class ExtractionSettings:
     noise: SensorNoise = field(default_factory=SensorNoise)
     split_threshold: Annotated[
         float,
-        _metres(
+        number(
             0.005,
             1.0,
+            "m",
             "a piece is split where a point is farther from its chord than this and than noise explains",
         ),
     ] = 0.05
     gap: Annotated[
         float,
-        _metres(
+        number(
             0.02,
             5.0,
+            "m",
             "neighbouring points farther apart are not connected, unless as on a wall seen at a grazing angle",
         ),
     ] = 0.3
     min_points: Annotated[
         int, Field(ge=2, le=1000, description="a segment needs at least this many points")
     ] = 7
-    min_length: Annotated[float, _metres(0.0, 10.0, "a segment must be at least this long")] = 0.2
+    min_length: Annotated[float, number(0.0, 10.0, "m", "a segment must be at least this long")] = 0.2
     corner_angle: Annotated[
         float,
         Field(
@@ -63,9 +62,10 @@ class ExtractionSettings:
     ] = 0.35
     corner_gap: Annotated[
         float,
-        _metres(
+        number(
             0.01,
             2.0,
+            "m",
             "both facing ends must be this close to the intersection, beyond point spacing and noise",
         ),
     ] = 0.2

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from lidarcore.client.answers import PastPose, Pose, SeenCorner, Which
 from lidarcore.client.connection import Connection, given
 from lidarcore.errors import MapFileError, UnknownLandmarkError
+from lidarcore.files import replacing
 from lidarcore.landmarks import Box, Circle, Landmark, Metric, Neighbour, Session
 
 _PAGE = 1000  # landmarks and states asked for at a time
@@ -128,13 +129,8 @@ class Client:
         path = Path(path)
         asked = given(session=session, format=path.suffix.lower().removeprefix("."))
         content = self._connection.ask("GET", "/map", params=asked).content
-        partial = path.with_name(f".{path.name}.part")
-        with _explained(path):
-            try:
-                partial.write_bytes(content)
-                partial.replace(path)
-            finally:
-                partial.unlink(missing_ok=True)
+        with _explained(path), replacing(path) as partial:
+            partial.write_bytes(content)
 
     def import_map(self, path: str | Path) -> Session:
         """Load a file that `export_map` wrote (.json, .csv, .geojson) as a new session.

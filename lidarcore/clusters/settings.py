@@ -7,11 +7,8 @@ from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass
 
 from lidarcore.clusters.registry import CLUSTERERS
+from lidarcore.fields import number
 from lidarcore.noise import SensorNoise
-
-
-def _metres(low: float, high: float, text: str) -> object:
-    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": "m"})
 
 
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
@@ -26,9 +23,11 @@ class ClusterSettings:
         str, Field(description="clustering method", json_schema_extra={"enum": list(CLUSTERERS)})
     ] = "heuristic"
     distance: Annotated[
-        float, _metres(0.01, 10.0, "heuristic: consecutive points farther apart are different objects")
+        float, number(0.01, 10.0, "m", "heuristic: consecutive points farther apart are different objects")
     ] = 0.3
-    eps: Annotated[float, _metres(0.01, 10.0, "dbscan: points at most this far apart are neighbours")] = 0.3
+    eps: Annotated[float, number(0.01, 10.0, "m", "dbscan: points at most this far apart are neighbours")] = (
+        0.3
+    )
     min_points: Annotated[
         int,
         Field(
@@ -48,7 +47,7 @@ class ClusterSettings:
     ] = None
     k_max: Annotated[int, Field(ge=1, le=50, description="kmeans, gmm: most clusters to choose from")] = 12
     max_range: Annotated[
-        float | None, _metres(0.1, 1000.0, "points farther from the sensor are left out; none for all")
+        float | None, number(0.1, 1000.0, "m", "points farther from the sensor are left out; none for all")
     ] = None
     noise: SensorNoise = field(default_factory=SensorNoise)
 

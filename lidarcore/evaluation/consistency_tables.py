@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from lidarcore import files
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency import Consistency, Row
 from lidarcore.evaluation.consistency_figures import FIGURES
@@ -27,7 +28,7 @@ def write(study: Consistency, path: Path) -> None:
     """Write every row with every figure and the ends of its confidence interval; empty where there is none."""
     check(path)
     text = to_json(study) if path.suffix.lower() == ".json" else to_csv(study.rows())
-    path.write_text(text, "utf-8")
+    files.write(path, text)
 
 
 def to_json(study: Consistency) -> str:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
 from lidarcore.scan import Array
@@ -19,14 +20,30 @@ class Interval:
     low: float
     high: float
 
+    @property
+    def half_width(self) -> float:
+        """Half the length of the interval; infinite if nothing is known of the error."""
+        return (self.high - self.low) / 2
+
     def contains(self, value: float) -> bool:
         """Whether the study is compatible with this value."""
         return self.low <= value <= self.high
+
+    def text(self, digits: int, factor: float = 1.0) -> str:
+        """'1.23 ± 0.04' of an interval around its value, or the value alone if its error is not known."""
+        value = f"{factor * self.value:.{digits}f}".replace("-", "−")
+        return f"{value} ± {factor * self.half_width:.{digits}f}" if np.isfinite(self.half_width) else value
 
     def root(self) -> "Interval":
         """The same for the square root; what is below 0 by chance becomes 0."""
         value, low, high = np.sqrt(np.maximum([self.value, self.low, self.high], 0.0)).tolist()
         return Interval(value, low, high)
+
+
+def mean(values: ArrayLike) -> Interval:
+    """Mean of independent runs (R,), with Student's t; one run says nothing of its error."""
+    x = np.asarray(values, np.float64)
+    return ratio(x, np.ones(len(x)))
 
 
 def ratio(numerators: Array, denominators: Array) -> Interval:

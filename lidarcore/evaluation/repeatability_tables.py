@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from lidarcore import files
 from lidarcore.evaluation.consistency_tables import check
 from lidarcore.evaluation.repeatability_summary import Summary
 
@@ -15,7 +16,7 @@ from lidarcore.evaluation.repeatability_summary import Summary
 def write(summary: Summary, path: Path) -> None:
     """Raises EvaluationError unless the file's name ends in .json or .csv."""
     check(path)
-    path.write_text(to_json(summary) if path.suffix.lower() == ".json" else to_csv(summary), "utf-8")
+    files.write(path, to_json(summary) if path.suffix.lower() == ".json" else to_csv(summary))
 
 
 def to_json(summary: Summary) -> str:

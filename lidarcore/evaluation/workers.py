@@ -3,7 +3,8 @@
 import signal
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
+from functools import partial
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -27,6 +28,26 @@ def outcomes(
         yield from ((chunk, function(chunk)) for chunk in chunks)
     else:
         yield from _on_cores(function, chunks, workers)
+
+
+def run_all(
+    function: Callable[[Chunk], Outcome],
+    chunks: Iterable[Chunk],
+    workers: int,
+    done: Callable[[], None] = lambda: None,
+) -> list[Outcome]:
+    """The outcome of each chunk, in their order; `done` is called as each ends."""
+    numbered = list(enumerate(chunks))
+    ordered: dict[int, Outcome] = {}
+    with closing(outcomes(partial(_of_numbered, function), numbered, workers)) as made:
+        for (number, _), outcome in made:
+            ordered[number] = outcome
+            done()
+    return [ordered[number] for number, _ in numbered]
+
+
+def _of_numbered(function: Callable[[Chunk], Outcome], chunk: tuple[int, Chunk]) -> Outcome:
+    return function(chunk[1])
 
 
 def _on_cores(

@@ -15,7 +15,7 @@ from itertools import islice, pairwise
 import numpy as np
 
 from lidarcore.clusters import CLUSTERERS, Clusters, ClusterSettings, cluster
-from lidarcore.experiments.parallel import run_all
+from lidarcore.evaluation.workers import run_all
 from lidarcore.experiments.tracks import Errors, Track, dead_reckoned, errors, filtered
 from lidarcore.localization import LocalizationSettings, OdometryNoise, deskew
 from lidarcore.noise import SensorNoise

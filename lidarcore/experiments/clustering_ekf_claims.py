@@ -3,8 +3,8 @@
 import numpy as np
 
 from lidarcore.clusters import CLUSTERERS
+from lidarcore.evaluation.intervals import Interval, mean
 from lidarcore.experiments.clustering_ekf import METHODS, Result
-from lidarcore.experiments.interval import Interval
 from lidarcore.scan import Array
 
 Claim = tuple[str, str, bool | None]
@@ -37,7 +37,7 @@ def _of_time(claim: str, ms: Array, agrees: bool) -> Claim:
 def dbscan_against_others(result: Result) -> Interval:
     """Accumulated error with DBSCAN and the filter over the mean of the other methods', less 1; paired by run."""
     total = result.error("with", "accumulated").sum(axis=1)
-    return Interval.of(total[:, _DBSCAN] / total[:, _OTHERS].mean(axis=1) - 1)
+    return mean(total[:, _DBSCAN] / total[:, _OTHERS].mean(axis=1) - 1)
 
 
 def _five_per_cent(result: Result) -> Claim:
@@ -53,32 +53,32 @@ def _five_per_cent(result: Result) -> Claim:
 def _least(result: Result) -> Claim:
     total = result.error("with", "accumulated").sum(axis=1)
     best = min(_OTHERS, key=lambda m: float(total[:, m].mean()))
-    difference = Interval.of(total[:, _DBSCAN] - total[:, best])
+    difference = mean(total[:, _DBSCAN] - total[:, best])
     return (
         "With DBSCAN and the filter the least error accumulates.",
         f"Against {CLUSTERERS[METHODS[best]].title}, the best of the others, {difference.text(2)} m more.",
-        None if difference.contains(0) else difference.mean < 0,
+        None if difference.contains(0) else difference.value < 0,
     )
 
 
 def _filter_helps(result: Result) -> Claim:
     total = {mode: result.error(mode, "accumulated").sum(axis=1).mean(axis=1) for mode in ("without", "with")}
-    ratio = Interval.of(total["with"] / total["without"] - 1)
+    ratio = mean(total["with"] / total["without"] - 1)
     return (
         "The filter keeps the error of the odometry from adding up.",
         f"Accumulated error with the filter against without: {ratio.text(0, 100)} %.",
-        None if ratio.contains(0) else ratio.mean < 0,
+        None if ratio.contains(0) else ratio.value < 0,
     )
 
 
 def _recovers(result: Result) -> Claim:
-    largest = Interval.of(result.error("lost", "largest").mean(axis=(1, 2)))
+    largest = mean(result.error("lost", "largest").mean(axis=(1, 2)))
     final = result.error("lost", "final").mean(axis=(1, 2))
     undisturbed = result.error("with", "final").mean(axis=(1, 2))
-    more, nothing = Interval.of(final - undisturbed), largest.mean - float(undisturbed.mean())
+    more, nothing = mean(final - undisturbed), largest.value - float(undisturbed.mean())
     return (
         "Where objects are lost the robot leaves its path, and it recovers when it sees them again.",
         f"At its largest the position is {largest.text(0, 1e3)} mm off, "
-        f"at the end {Interval.of(final).text(0, 1e3)} mm: {more.text(0, 1e3)} mm more than without the loss.",
+        f"at the end {mean(final).text(0, 1e3)} mm: {more.text(0, 1e3)} mm more than without the loss.",
         None if more.contains(0) and more.contains(nothing) else more.low <= 0,
     )

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from lidarcore.clusters import CLUSTERERS
+from lidarcore.evaluation.intervals import Interval, mean
 from lidarcore.experiments import report
 from lidarcore.experiments.clustering_ekf import METHODS, MODES, TRAJECTORIES, Design, Drive, Result, simulate
 from lidarcore.experiments.figures import Bar, Map, bars, chart
-from lidarcore.experiments.interval import Interval
 from lidarcore.experiments.tracks import Track
 from lidarcore.localization.measurement import to_world
 from lidarcore.scan import Array
@@ -21,13 +21,13 @@ _BOX = (-2.0, 23.0, -6.5, 6.5)
 
 def _of(values: Array) -> list[list[Interval]]:
     """Intervals of values (runs, rows, columns)."""
-    return [[Interval.of(values[:, i, j]) for j in range(values.shape[2])] for i in range(values.shape[1])]
+    return [[mean(values[:, i, j]) for j in range(values.shape[2])] for i in range(values.shape[1])]
 
 
 def _farthest(cells: Sequence[Sequence[Interval]]) -> float:
     """Up to where bars and their intervals reach."""
     return max(
-        cell.mean + (cell.half_width if math.isfinite(cell.half_width) else 0)
+        cell.value + (cell.half_width if math.isfinite(cell.half_width) else 0)
         for row in cells
         for cell in row
     )
@@ -42,7 +42,7 @@ def figure3(result: Result) -> str:
             trajectory,
             bars(
                 [
-                    Bar(name, cell.mean, cell.low, cell.high, cell.text(2), f"m{m}")
+                    Bar(name, cell.value, cell.low, cell.high, cell.text(2), f"m{m}")
                     for m, (name, cell) in enumerate(zip(NAMES, row, strict=True))
                 ],
                 most,
@@ -60,9 +60,7 @@ def figure3(result: Result) -> str:
         1e3 * result.values(lambda o, name=name: getattr(o, name) / o.scans).mean(axis=1)  # type: ignore[misc]
         for name in ("clustering_s", "given_k_s", "filter_s")
     ]
-    rows = [
-        [name, *(Interval.of(values[:, m]).text(2) for values in per_scan)] for m, name in enumerate(NAMES)
-    ]
+    rows = [[name, *(mean(values[:, m]).text(2) for values in per_scan)] for m, name in enumerate(NAMES)]
     headers = ("method", "clustering", "number of clusters told", "filter")
     return report.figure(caption, panels) + report.table("Processor time of a scan, ms", headers, rows)
 
@@ -77,7 +75,7 @@ def figure4(result: Result) -> str:
         for mode in MODES:
             rows.append(WORDS[mode])
             rows += [
-                Bar(name, cell.mean, cell.low, cell.high, cell.text(1), f"m{m}")
+                Bar(name, cell.value, cell.low, cell.high, cell.text(1), f"m{m}")
                 for m, (name, cell) in enumerate(zip(NAMES, cells[mode][t], strict=True))
             ]
         panels.append((trajectory, bars(rows, most, title=f"Accumulated error by method, {trajectory}, m")))

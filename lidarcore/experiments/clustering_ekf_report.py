@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lidarcore.evaluation.intervals import mean
 from lidarcore.experiments import report
 from lidarcore.experiments.clustering_ekf import MODES, TRAJECTORIES, Design, Result
 from lidarcore.experiments.clustering_ekf_claims import claims
 from lidarcore.experiments.clustering_ekf_figures import NAMES, WORDS, figure3, figure4, figure5, figure6
-from lidarcore.experiments.interval import Interval
 from lidarcore.simulation.robot import RATE
 
 TITLE = "Clusters of lidar points as landmarks, with and without a Kalman filter"
@@ -82,9 +82,9 @@ def _consistency(result: Result) -> str:
     rows: Sequence[Sequence[str]] = [
         [
             name,
-            *(Interval.of(result.error(mode, "anees")[:, :, m].mean(axis=1)).text(2) for mode in MODES),
-            Interval.of(result.values(lambda o: o.clusters / o.scans)[:, :, m].mean(axis=1)).text(2),
-            Interval.of(result.values(lambda o: float(o.landmarks))[:, :, m].mean(axis=1)).text(1),
+            *(mean(result.error(mode, "anees")[:, :, m].mean(axis=1)).text(2) for mode in MODES),
+            mean(result.values(lambda o: o.clusters / o.scans)[:, :, m].mean(axis=1)).text(2),
+            mean(result.values(lambda o: float(o.landmarks))[:, :, m].mean(axis=1)).text(1),
         ]
         for m, name in enumerate(NAMES)
     ]

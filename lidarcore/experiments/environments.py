@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 
 from lidarcore.evaluation.trials import SEGMENTATIONS, Segmentation
+from lidarcore.evaluation.workers import run_all
 from lidarcore.experiments.corner_study import CornerStudy, recorded, simulated
 from lidarcore.experiments.paper_rooms import BEAMS, NOISE, Room
-from lidarcore.experiments.parallel import run_all
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from lidarcore.errors import LandmarkError, MapFileError
+from lidarcore.files import replacing
 from lidarcore.landmarks.landmark import COLUMNS, Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
 
@@ -39,14 +40,13 @@ def export_map(landmark_map: LandmarkMap, path: str | Path) -> None:
     Raises MapFileError for another suffix or a file that cannot be written.
     """
     path = Path(path)
-    name, partial = _format(path), path.with_name(f".{path.name}.part")
-    with _explained(path.name):
-        try:
-            with partial.open("w", encoding="utf-8", newline="") as file:
-                write_landmarks(landmark_map, file, name)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    name = _format(path)
+    with (
+        _explained(path.name),
+        replacing(path) as partial,
+        partial.open("w", encoding="utf-8", newline="") as file,
+    ):
+        write_landmarks(landmark_map, file, name)
 
 
 def import_map(landmark_map: LandmarkMap, path: str | Path) -> list[int]:

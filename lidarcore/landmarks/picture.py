@@ -6,6 +6,7 @@ import numpy as np
 from PIL import Image
 
 from lidarcore.errors import MapFileError
+from lidarcore.files import replacing, write
 from lidarcore.landmarks.landmark_map import LandmarkMap
 
 _UNKNOWN, _OCCUPIED = 205, 0  # grey values as ROS map_server writes them
@@ -35,8 +36,9 @@ def export_picture(landmark_map: LandmarkMap, path: str | Path, resolution: floa
     grey = np.full((size[1], size[0]), _UNKNOWN, np.uint8)
     grey[size[1] - 1 - row, column] = _OCCUPIED  # the first row is the top, the largest y
     try:
-        Image.fromarray(grey).save(path)
-        path.with_suffix(".yaml").write_text(_yaml(path.name, resolution, origin.tolist()), encoding="utf-8")
+        with replacing(path) as partial:
+            Image.fromarray(grey).save(partial, "PNG")
+        write(path.with_suffix(".yaml"), _yaml(path.name, resolution, origin.tolist()))
     except OSError as error:
         raise MapFileError(f"{path} cannot be written: {error}.") from error
 

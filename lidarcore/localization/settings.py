@@ -7,37 +7,34 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from lidarcore.fields import number
 from lidarcore.localization.kernels import odometry_variances
 from lidarcore.scan import Array
 
 _CONFIG = ConfigDict(extra="forbid")
 
 
-def _number(low: float, high: float, unit: str, text: str) -> object:
-    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": unit})
-
-
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
 class OdometryNoise:
     """Random walk of odometry: variances grow with the way and the turn, however finely they are cut into steps."""
 
-    along: Annotated[float, _number(1e-4, 1, "m/√m", "standard deviation ahead after one metre")] = 0.03
-    across: Annotated[float, _number(1e-4, 1, "m/√m", "standard deviation sideways after one metre")] = 0.01
+    along: Annotated[float, number(1e-4, 1, "m/√m", "standard deviation ahead after one metre")] = 0.03
+    across: Annotated[float, number(1e-4, 1, "m/√m", "standard deviation sideways after one metre")] = 0.01
     heading_per_metre: Annotated[
-        float, _number(1e-4, 1, "rad/√m", "standard deviation of the heading after one metre")
+        float, number(1e-4, 1, "rad/√m", "standard deviation of the heading after one metre")
     ] = 0.02
     heading_per_radian: Annotated[
-        float, _number(1e-4, 1, "rad/√rad", "standard deviation of the heading after turning one radian")
+        float, number(1e-4, 1, "rad/√rad", "standard deviation of the heading after turning one radian")
     ] = 0.05
     slip_per_radian: Annotated[
-        float, _number(0, 1, "m/√rad", "standard deviation of the position after turning one radian")
+        float, number(0, 1, "m/√rad", "standard deviation of the position after turning one radian")
     ] = 0.01
     unseen: Annotated[
         float,
-        _number(0, 1, "m/√s", "standard deviation of the position after a second that wheels do not tell of"),
+        number(0, 1, "m/√s", "standard deviation of the position after a second that wheels do not tell of"),
     ] = 0.002
     unseen_turn: Annotated[
-        float, _number(0, 1, "rad/√s", "standard deviation of the heading after a second, the same")
+        float, number(0, 1, "rad/√s", "standard deviation of the heading after a second, the same")
     ] = 0.002
 
     @property
@@ -61,16 +58,16 @@ class OdometryNoise:
 class VelocityNoise:
     """White accelerations of the constant-velocity model."""
 
-    acceleration: Annotated[float, _number(1e-4, 50, "m/s/√s", "change of the speed within a second")] = 0.5
+    acceleration: Annotated[float, number(1e-4, 50, "m/s/√s", "change of the speed within a second")] = 0.5
     sideways: Annotated[
-        float, _number(0, 50, "m/s/√s", "change of the speed sideways within a second; 0 if it never slides")
+        float, number(0, 50, "m/s/√s", "change of the speed sideways within a second; 0 if it never slides")
     ] = 0.5
     turn_acceleration: Annotated[
-        float, _number(1e-4, 50, "rad/s/√s", "change of the turn rate within a second")
+        float, number(1e-4, 50, "rad/s/√s", "change of the turn rate within a second")
     ] = 1.0
-    speed: Annotated[float, _number(1e-3, 50, "m/s", "standard deviation of the speed at the start")] = 1.0
+    speed: Annotated[float, number(1e-3, 50, "m/s", "standard deviation of the speed at the start")] = 1.0
     turn_rate: Annotated[
-        float, _number(1e-3, 50, "rad/s", "standard deviation of the turn rate at the start")
+        float, number(1e-3, 50, "rad/s", "standard deviation of the turn rate at the start")
     ] = 1.0
 
 
@@ -83,22 +80,20 @@ class LocalizationSettings:
     ] = "odometry"
     odometry: OdometryNoise = field(default_factory=OdometryNoise)
     velocity: VelocityNoise = field(default_factory=VelocityNoise)
-    max_speed: Annotated[float, _number(0.01, 100, "m/s", "odometry that is faster has jumped")] = 3.0
-    max_turn_rate: Annotated[float, _number(0.01, 100, "rad/s", "odometry that turns faster has jumped")] = (
-        6.0
-    )
+    max_speed: Annotated[float, number(0.01, 100, "m/s", "odometry that is faster has jumped")] = 3.0
+    max_turn_rate: Annotated[float, number(0.01, 100, "rad/s", "odometry that turns faster has jumped")] = 6.0
     gate: Annotated[
-        float, _number(0.5, 0.9999, "", "share of the true pairs that the chi-square gate lets through")
+        float, number(0.5, 0.9999, "", "share of the true pairs that the chi-square gate lets through")
     ] = 0.99
     new_gate: Annotated[
-        float, _number(0.9, 0.999999999, "", "a new landmark lies outside this gate of every known one")
+        float, number(0.9, 0.999999999, "", "a new landmark lies outside this gate of every known one")
     ] = 0.99999
     ambiguity: Annotated[
-        float, _number(1, 1e3, "", "a pair is ambiguous if it is not this many times likelier than another")
+        float, number(1, 1e3, "", "a pair is ambiguous if it is not this many times likelier than another")
     ] = 10.0
     confirm: Annotated[int, Field(ge=1, le=1000, description="sightings that confirm a landmark")] = 4
     settle: Annotated[
-        float, _number(0, 600, "s", "time from its first sighting before a landmark is confirmed")
+        float, number(0, 600, "s", "time from its first sighting before a landmark is confirmed")
     ] = 1.0
     memory: Annotated[
         int, Field(ge=1, le=10000, description="sightings that count against views without it")
@@ -106,7 +101,7 @@ class LocalizationSettings:
 
     unevenness: Annotated[
         float,
-        _number(
+        number(
             0,
             0.5,
             "m",
@@ -141,7 +136,7 @@ class NavigationSettings:
     ] = "auto"
     max_width: Annotated[
         float,
-        _number(
+        number(
             0.01,
             10,
             "m",

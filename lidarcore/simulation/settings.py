@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
+from lidarcore.fields import number
 from lidarcore.localization.settings import OdometryNoise
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array
@@ -15,17 +16,13 @@ from lidarcore.simulation.worlds import WORLDS, place
 _CONFIG = ConfigDict(extra="forbid")
 
 
-def _number(low: float, high: float, unit: str, text: str) -> object:
-    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": unit})
-
-
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
 class OdometryError:
     """How odometry errs: a random walk as filters assume, and systematic errors of wheels as they do not."""
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)
-    scale: Annotated[float, _number(-0.5, 0.5, "", "share by which every way is measured too long")] = 0.0
-    track: Annotated[float, _number(-0.5, 0.5, "", "share by which every turn is measured too large")] = 0.0
+    scale: Annotated[float, number(-0.5, 0.5, "", "share by which every way is measured too long")] = 0.0
+    track: Annotated[float, number(-0.5, 0.5, "", "share by which every turn is measured too large")] = 0.0
 
     def measured(self, increment: Array, rng: np.random.Generator) -> Array:
         """What wheels say of a true increment (3,) m, m, rad, seen from where it starts."""
@@ -47,14 +44,14 @@ class SimulationSettings:
     ] = None
     odometry: OdometryError = field(default_factory=OdometryError)
     field_of_view: Annotated[
-        float, _number(0.1, 2 * np.pi, "rad", "angle that the sensor sees, half to either side of ahead")
+        float, number(0.1, 2 * np.pi, "rad", "angle that the sensor sees, half to either side of ahead")
     ] = 2 * np.pi
-    max_range: Annotated[float, _number(0.5, 100.0, "m", "nothing farther is seen")] = 40.0
+    max_range: Annotated[float, number(0.5, 100.0, "m", "nothing farther is seen")] = 40.0
     noise: SensorNoise = field(default_factory=lambda: SensorNoise(0.01, 0.001))
     mixed: Annotated[
-        float, _number(0, 1, "", "share of the beams at an edge that report a range in between")
+        float, number(0, 1, "", "share of the beams at an edge that report a range in between")
     ] = 0.5
-    dropouts: Annotated[float, _number(0, 1, "", "share of the beams that are lost for no reason")] = 0.003
+    dropouts: Annotated[float, number(0, 1, "", "share of the beams that are lost for no reason")] = 0.003
     people: Annotated[int, Field(ge=0, le=20, description="how many walk about")] = 0
     seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="of everything that is random")] = 0
 

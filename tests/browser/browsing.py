@@ -89,6 +89,12 @@ class Server:
         position = {"kind": "recording", "index": index}
         wait_until(lambda: self.get("frame")["source"].items() >= position.items(), f"scan {index} is shown")
 
+    def pause(self) -> dict:
+        """The frame that stays: what was in the making when the source stopped has been shown."""
+        index = self.patch("source", {"state": "paused"})["index"]
+        wait_until(lambda: self.get("frame")["source"]["index"] >= index, f"scan {index} is shown")
+        return self.get("frame")
+
     def disturb(self, *commands: str) -> None:
         for command in commands:
             self.api.post("emulator", json={"command": command}).raise_for_status()

@@ -90,7 +90,7 @@ def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], t
     wait_until(lambda: visitor.server.get("settings")["view"]["theme"] == theme, "the preference is taken")
     expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)
     visitor.server.patch("settings", MAPPED)
-    visitor.server.patch("source", {"state": "paused"})  # the corner that is selected stays
+    visitor.server.pause()  # the corner that is selected stays
     visitor.page.keyboard.press("ArrowDown")
     for panel in PANELS[1:]:
         visitor.page.get_by_role("tab", name=panel).click()
@@ -103,7 +103,7 @@ def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], t
 
 def test_theme_button_turns_the_page_and_the_scene(visit: Callable[..., Visitor]) -> None:
     visitor = visit(theme="dark").open()
-    visitor.server.patch("source", {"state": "paused"})
+    visitor.server.pause()
     assert visitor.still_picture().mean() < 80
     visitor.page.get_by_role("button", name="Light or dark").click()
     expect(visitor.page.locator("html")).to_have_attribute("data-theme", "light")

@@ -57,7 +57,7 @@ def test_number_of_clusters_is_chosen_by_the_page_or_for_every_scan(visitor: Vis
 
 def test_clusters_are_drawn_where_they_are_shown(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
-    server.patch("source", {"state": "paused"})
+    server.pause()
     server.patch("settings", {"view": {"layers": {"segments": False, "corners": False, "ellipses": False}}})
     visitor.fit()
     before = visitor.still_picture()

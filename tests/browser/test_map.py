@@ -77,7 +77,7 @@ def test_slam_is_switched_on_and_landmarks_appear(map_page: Visitor) -> None:
     page.locator("#navigation .segments label", has_text="SLAM").click()
     expect(page.locator("#whereabouts-state")).to_have_text("Tracking")
     wait_until(lambda: len(row_texts(page)) >= FEW, "landmarks are listed")
-    server.patch("source", {"state": "paused"})
+    server.pause()
     listed: dict[str, list[str]] = {}
 
     def all_are_listed() -> bool:
@@ -149,7 +149,7 @@ def test_innovations_are_charted_with_the_band_they_should_lie_in(mapped: Visito
 
 def test_pose_is_set_by_dragging_in_the_scene(mapped: Visitor) -> None:
     page, server = mapped.page, mapped.server
-    server.patch("source", {"state": "paused"})
+    server.pause()
     mapped.fit()
     to_world = world_of_pixels(mapped)
     box = page.locator("#scene").bounding_box()
@@ -201,7 +201,7 @@ def drag(page: Page, start: NDArray[np.float64], end: NDArray[np.float64]) -> No
 
 def test_one_click_in_the_scene_selects_the_landmark_and_the_corner_on_top_of_it(mapped: Visitor) -> None:
     page, server = mapped.page, mapped.server
-    server.patch("source", {"state": "paused"})
+    server.pause()
     mapped.fit()
     to_world = world_of_pixels(mapped)
     server.patch("settings", {"view": {"layers": None}})

@@ -24,8 +24,7 @@ def test_covariance_kind_changes_the_ellipses(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     page.get_by_label("Fitter").select_option("cwlf")
     wait_until(lambda: server.get("frame")["fitter"] == "cwlf", "cwlf makes the frames")
-    server.patch("source", {"state": "paused"})
-    consistent = server.get("frame")["summary"]["cwlf"]["median_area"]
+    consistent = server.pause()["summary"]["cwlf"]["median_area"]
     page.get_by_text("Published", exact=True).click()
     wait_until(lambda: server.get("frame")["covariance"] == "published", "the frame is made again")
     assert server.get("frame")["summary"]["cwlf"]["median_area"] < consistent, "cwlf's formula claims less"
@@ -123,7 +122,7 @@ def test_value_out_of_range_is_not_sent(visitor: Visitor) -> None:
 
 def test_layers_can_be_hidden(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
-    server.patch("source", {"state": "paused"})
+    server.pause()
     visitor.fit()
     for layer in ("points", "segments", "ellipses", "grid"):
         before = drawn(visitor.still_picture()).sum()
@@ -136,7 +135,7 @@ def test_layers_can_be_hidden(visitor: Visitor) -> None:
 
 def test_rejections_say_why_a_wall_is_missing(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
-    server.patch("source", {"state": "paused"})
+    server.pause()
     server.patch("settings", {"extraction": {"min_length": 2.5}})
     page.get_by_role("tab", name="Rejected").click()
     expected = [rejection["message"] for rejection in server.get("frame")["rejections"]]

@@ -29,7 +29,7 @@ def test_frames_advance_in_figures_and_picture(visitor: Visitor) -> None:
 
 def test_figures_are_those_of_the_frame(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
-    server.patch("source", {"state": "paused"})
+    server.pause()
     wait_until(
         lambda: visitor.readout("frame") == str(server.get("frame")["sequence"]), "the last frame is shown"
     )

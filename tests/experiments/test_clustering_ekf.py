@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lidarcore.evaluation.intervals import mean
+from lidarcore.evaluation.workers import run_all
 from lidarcore.experiments.clustering_ekf import (
     METHODS,
     MODES,
@@ -22,8 +24,6 @@ from lidarcore.experiments.clustering_ekf import (
     simulate,
 )
 from lidarcore.experiments.clustering_ekf_claims import claims, dbscan_against_others
-from lidarcore.experiments.interval import Interval
-from lidarcore.experiments.parallel import run_all
 from lidarcore.experiments.tracks import off_in_y
 from lidarcore.simulation.worlds import trajectories
 
@@ -193,15 +193,15 @@ def test_claims_agree_differ_or_stay_open_as_the_runs_say(result: Result) -> Non
     assert verdict(1.0, 0.01) is False
     assert verdict(0.85, 0.01) is False
     assert verdict(0.98, 0.2) is None
-    assert dbscan_against_others(with_dbscan(result, 0.9, 0.0)).mean == pytest.approx(-0.1)
+    assert dbscan_against_others(with_dbscan(result, 0.9, 0.0)).value == pytest.approx(-0.1)
 
 
 def test_intervals_hold_the_mean_as_often_as_they_say() -> None:
     rng = np.random.default_rng(1)
-    held = [Interval.of(rng.normal(3, 2, 6)).contains(3) for _ in range(4000)]
+    held = [mean(rng.normal(3, 2, 6)).contains(3) for _ in range(4000)]
     assert np.mean(held) == pytest.approx(0.95, abs=4 * np.sqrt(0.95 * 0.05 / 4000))
-    assert Interval.of([2.0]).text(1) == "2.0"
-    assert Interval.of([-1.0, -2.0]).text(1, 10) == "−15.0 ± 63.5"
+    assert mean([2.0]).text(1) == "2.0"
+    assert mean([-1.0, -2.0]).text(1, 10) == "−15.0 ± 63.5"
 
 
 def test_a_report_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:

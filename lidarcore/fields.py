@@ -1,0 +1,10 @@
+"""How settings declare a number."""
+
+from typing import Any
+
+from pydantic import Field
+
+
+def number(low: float, high: float, unit: str, text: str) -> Any:
+    """A finite number from low to high, with its unit and meaning, as JSON schema, page and command line show them."""
+    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": unit})
