@@ -13,6 +13,7 @@ from starlette.responses import FileResponse
 
 from app import problems
 from app.api import (
+    calibration,
     clusters,
     docs,
     frame,
@@ -22,11 +23,13 @@ from app.api import (
     meta,
     recorder,
     recordings,
+    repeatability,
     selection,
     sensor,
     sessions,
     settings,
     source,
+    studies,
 )
 from app.landmark_store import LandmarkStore
 from app.library import MAX_BYTES, Library
@@ -47,8 +50,8 @@ from lidarcore.errors import LandmarkMapError
 API = "/api/v1"
 MAP_FILE = "landmarks.db"
 ROOMS = (
-    frame, clusters, localization, landmarks, map, sessions, settings, source, sensor, recordings, recorder,
-    selection, meta,
+    frame, clusters, localization, landmarks, map, sessions, repeatability, calibration, studies, settings, source,
+    sensor, recordings, recorder, selection, meta,
 )  # fmt: skip
 STATIC = Path(str(resources.files("app"))).parent / "static"
 

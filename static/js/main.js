@@ -1,6 +1,7 @@
 // The page, wired together: rooms are mounted, then the stream feeds the store they read from.
 
 import { request } from "./api.js";
+import { mountCalibration } from "./calibration.js";
 import { mountColours } from "./colours.js";
 import { mountClusters } from "./clusters.js";
 import { mountCorners } from "./corners.js";
@@ -21,6 +22,7 @@ import { mountParameters } from "./parameters.js";
 import { mountPlots } from "./plots.js";
 import { mountRecordings } from "./recordings.js";
 import { mountRejections } from "./rejections.js";
+import { mountRepeatability } from "./repeatability.js";
 import { beginsAnew } from "./run.js";
 import { fitScene, mountScene } from "./scene.js";
 import { fieldsOf } from "./schema.js";
@@ -47,6 +49,7 @@ mountTimeline();
 mountMethod();
 mountView();
 mountParameters();
+mountCalibration();
 mountClusters();
 mountNavigation();
 mountLandmarks();
@@ -55,6 +58,7 @@ mountMaps();
 mountFilter();
 mountCorners();
 mountPlots();
+mountRepeatability();
 mountSource();
 mountSimulation();
 mountDevice();
