@@ -10,7 +10,7 @@ import numpy as np
 from pydantic_core import to_json
 
 from app.located import clusters_json, localization_json
-from app.navigation import Where
+from app.run import Where
 from app.selection import Selection
 from app.settings import Settings
 from app.taken import Taken

@@ -5,7 +5,7 @@ from typing import cast
 import numpy as np
 from scipy.special import chdtri
 
-from app.navigation import Where
+from app.run import Where
 from app.wire import ClusterJson, InnovationJson, LocalizationJson, Matrix3, PoseJson
 from lidarcore.clusters import Clusters
 from lidarcore.localization.association import squared_distances

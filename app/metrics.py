@@ -16,8 +16,8 @@ from prometheus_client.registry import Collector
 from starlette.responses import Response
 
 from app.frame import Frame
-from app.navigation import Where
 from app.recorder import AsyncRecorder
+from app.run import Where
 from app.runtime import Runtime
 from app.stream import Hub
 from app.wire import DeviceJson

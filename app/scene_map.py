@@ -8,7 +8,7 @@ import numpy as np
 from app.canvas import Canvas
 from app.colours import Rgbs
 from app.frame import Frame
-from app.navigation import Where
+from app.run import Where
 from app.settings import Layers
 from app.shapes import CIRCLE, Array, ellipses, in_world, polylines, text
 from app.trails import Paths

@@ -7,8 +7,31 @@ from numpy.typing import NDArray
 
 from lidarcore.errors import LocalizationError
 from lidarcore.localization.points import Points
+from lidarcore.localization.reckoning import Velocity
 from lidarcore.poses import wrap
 from lidarcore.scan import Array, Scan
+
+
+class Distortion:
+    """What the motion of the sensor did to the newest scan, as far as it was taken out.
+
+    stamp, velocity  of the scan that was deskewed last, NaN if none was, and by what
+    """
+
+    def __init__(self) -> None:
+        self.stamp = np.nan
+        self.velocity: Velocity = (0.0, 0.0, 0.0)
+
+    def remove(self, scan: Scan, velocity: Velocity | None) -> Scan:
+        """The scan without it; as it is if the velocity or the times of the beams are not known."""
+        if velocity is None or scan.beam_times is None or not np.isfinite(scan.beam_times).all():
+            return scan
+        self.stamp, self.velocity = scan.stamp, velocity
+        return deskew(scan, *velocity)
+
+    def restore(self, points: Points, times: Array, stamp: float) -> Points:
+        """Points (K,) of what `remove` gave for the scan of this stamp, as they were seen at times (K,) s after it."""
+        return skew(points, times, *self.velocity) if stamp == self.stamp else points
 
 
 def deskew(scan: Scan, v: float, w: float, u: float = 0.0) -> Scan:

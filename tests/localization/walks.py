@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from lidarcore.localization import LocalizationSettings, Points
 from lidarcore.poses import compose, inverse
@@ -56,6 +57,11 @@ def sight(pose: Array) -> Array:
     return visible
 
 
+def draw(rng: np.random.Generator, mean: ArrayLike, covariance: Array) -> Array:
+    """A Gaussian (n,), the same for the same seed on every machine; by default eigenvectors differ in their signs."""
+    return rng.multivariate_normal(mean, covariance, method="cholesky")
+
+
 @dataclass(frozen=True, eq=False)
 class Walk:
     """What one robot sees: true poses (T, 3), odometry (T, 3), and sightings with their posts for each step."""
@@ -71,7 +77,7 @@ def walk(rng: np.random.Generator, settings: LocalizationSettings, poses: Array,
     odometry, sightings = [poses[0]], []
     for before, after in pairwise(poses):
         u = compose(inverse(before), after)
-        error = rng.multivariate_normal(np.zeros(3), settings.odometry.covariance(u))
+        error = draw(rng, np.zeros(3), settings.odometry.covariance(u))
         odometry.append(compose(odometry[-1], u + error))
     for pose, posts in zip(poses, seen, strict=True):
         sightings.append(sighting(rng, pose, POSTS[posts]))
