@@ -10,7 +10,7 @@ import numpy as np
 from lidarcore.clusters import Clusters
 from lidarcore.localization import LocalizationSettings, OdometryNoise, Points
 from lidarcore.localization.measurement import to_world
-from lidarcore.localization.motion import move
+from lidarcore.localization.motion_kernels import move
 from lidarcore.localization.slam import Slam
 from lidarcore.poses import compose, inverse, wrap
 from lidarcore.scan import Array, Scan

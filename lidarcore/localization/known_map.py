@@ -10,7 +10,7 @@ from lidarcore.localization.estimate import Estimate
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.localizer import Localizer
 from lidarcore.localization.measurement import to_sensor
-from lidarcore.localization.motion import move
+from lidarcore.localization.motion_kernels import move
 from lidarcore.localization.points import Points
 from lidarcore.localization.register import is_at_odds
 from lidarcore.localization.settings import LocalizationSettings

@@ -16,7 +16,8 @@ from lidarcore.localization.kalman import Innovation
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.measurement import to_sensor
 from lidarcore.localization.moments import in_moments, joined
-from lidarcore.localization.motion import motion_model, move, start
+from lidarcore.localization.motion import motion_model, start
+from lidarcore.localization.motion_kernels import move
 from lidarcore.localization.points import Points
 from lidarcore.localization.register import Register
 from lidarcore.localization.settings import LocalizationSettings

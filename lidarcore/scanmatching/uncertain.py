@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lidarcore.errors import CovarianceError
-from lidarcore.localization.motion import move
+from lidarcore.localization.motion_kernels import move
 from lidarcore.localization.points import check_covariance
 from lidarcore.poses import compose, inverse, wrap
 from lidarcore.scan import Array

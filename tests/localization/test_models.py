@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from numeric import jacobian
 
 from lidarcore.localization.measurement import to_sensor, to_world
-from lidarcore.localization.motion import ConstantVelocity, OdometryMotion, OdometryWithVelocity, arc, move
+from lidarcore.localization.motion import ConstantVelocity, OdometryMotion, OdometryWithVelocity
+from lidarcore.localization.motion_kernels import arc, move
 from lidarcore.localization.settings import OdometryNoise, VelocityNoise
 from lidarcore.scan import Array
 
