@@ -7,7 +7,7 @@ PORT ?= 8000
 RECORDING ?=
 bin := .venv/bin
 
-.PHONY: run test lint bench demo lock clean
+.PHONY: run test lint bench demo guide lock clean
 
 run: .venv/.run
 	$(bin)/lidarcore serve --host $(HOST) --http-port $(PORT) $(if $(RECORDING),"$(RECORDING)")
@@ -23,6 +23,10 @@ lint: .venv/.dev
 
 bench: .venv/.run
 	$(bin)/lidarcore bench
+
+# The page that explains the ellipses, measured and drawn anew; in a minute or two.
+guide: .venv/.run
+	$(bin)/python -m lidarcore.guide static/guide.html
 
 # What the wheel ships as a demo: an emulated sensor that moves, recorded as a real one would be.
 demo: .venv/.run
