@@ -1,6 +1,6 @@
 """The command `lidarcore calibrate`."""
 
-import json
+import math
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,12 +10,12 @@ import typer
 from app.cli_options import RecordingPath, Topic
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.table import Table
 
-    from lidarcore.evaluation.calibration import Calibration
-    from lidarcore.evaluation.intervals import Interval
+    from app.calibration_wire import BandsJson, CalibrationJson, IntervalJson
 
-DIFFERENT = 0.01  # p-value below which bands are said to differ
+DEGREES = math.degrees(1)
 
 
 def calibrate(
@@ -29,49 +29,66 @@ def calibrate(
         int | None, typer.Option(min=1, help="scans to take, 100 suffice; all if not given")
     ] = None,
     topic: Topic = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="all of it as JSON instead of a table, m and rad")
+    ] = False,
 ) -> None:
     """The noise of a sensor from a recording made while it stood still in a room."""
+    from pydantic_core import to_json
     from rich.console import Console
 
+    from app.calibration_wire import calibration_json
+    from app.profiles import Profile
     from lidarcore import files, open_recording
     from lidarcore.evaluation.calibration import calibrate as run
 
-    taken = islice(open_recording(recording, topic), skip, None if scans is None else skip + scans)
-    found = run(taken)
-    console = Console()
+    result = run(islice(open_recording(recording, topic), skip, None if scans is None else skip + scans))
+    found = calibration_json(result)
+    if json:
+        typer.echo(to_json(found, indent=1))
+    else:
+        _show(Console(), found)
+    if output is not None:
+        files.write(output, Profile.of(result.noise).text)
+
+
+def _show(console: "Console", found: "CalibrationJson") -> None:
     console.print(_table(found))
     console.print(
-        f"{found.beams:,} beams on {found.walls} walls; outliers {_text(found.outliers, 100)} %; the wall that "
-        f"drifted most did so by {1e3 * found.drift:.1f} mm. Intervals are of 95 % confidence."
+        f"{found['beams']:,} beams on {found['walls']} walls; outliers {_text(found['outliers'], 100)} %; the wall "
+        f"that drifted most did so by {1e3 * found['drift']:.1f} mm. Intervals are of 95 % confidence."
     )
-    if output is not None:
-        noise = {"sigma_range": found.noise.sigma_range, "sigma_bearing": found.noise.sigma_bearing}
-        files.write(output, json.dumps({"extraction": {"noise": noise}}, indent=1) + "\n")
+    for remark in found["remarks"]:
+        console.print(remark)
 
 
-def _table(found: "Calibration") -> "Table":
-    import math
-
+def _table(found: "CalibrationJson") -> "Table":
     from rich.table import Table
 
     table = Table("", "", "95 %")
-    table.add_row("sigma_bearing, mrad", *_cells(found.sigma_bearing))
-    table.add_row("sigma_range, mm", *_cells(found.sigma_range))
-    for title, bands, factor, unit in (
-        ("range", found.by_range, 1.0, "m"),
-        ("incidence", found.by_incidence, math.degrees(1), "°"),
-    ):
-        verdict = "differs" if bands.p_value < DIFFERENT else "the same"
-        table.add_section()
-        table.add_row(f"sigma_range by {title}, mm", verdict, f"p = {bands.p_value:.2g}")
-        for low, high, sigma in zip(bands.edges[:-1], bands.edges[1:], bands.sigmas, strict=True):
-            table.add_row(f"  {factor * low:.2f} to {factor * high:.2f} {unit}", *_cells(sigma))
+    table.add_row("sigma_bearing, mrad", *_cells(found["sigma_bearing"]))
+    table.add_row("sigma_range, mm", *_cells(found["sigma_range"]))
+    _add_bands(table, "range", found["by_range"], 1.0, "m")
+    _add_bands(table, "incidence", found["by_incidence"], DEGREES, "°")
+    table.add_section()
+    table.add_row("range bias, mm", *_cells(found["range_bias"]))
+    table.add_row("alignment, °", *_cells(found["alignment"], DEGREES))
     return table
 
 
-def _cells(figure: "Interval") -> tuple[str, str]:
-    return f"{1e3 * figure.value:.2f}", f"{1e3 * figure.low:.2f} to {1e3 * figure.high:.2f}"
+def _add_bands(table: "Table", title: str, bands: "BandsJson", factor: float, unit: str) -> None:
+    table.add_section()
+    verdict = "differs" if bands["differs"] else "the same"
+    table.add_row(f"sigma_range by {title}, mm", verdict, f"p = {bands['p_value']:.2g}")
+    for low, high, sigma in zip(bands["edges"][:-1], bands["edges"][1:], bands["sigmas"], strict=True):
+        table.add_row(f"  {factor * low:.2f} to {factor * high:.2f} {unit}", *_cells(sigma))
 
 
-def _text(figure: "Interval", factor: float) -> str:
-    return f"{factor * figure.value:.2f} ({factor * figure.low:.2f} to {factor * figure.high:.2f})"
+def _cells(figure: "IntervalJson | None", factor: float = 1e3) -> tuple[str, str]:
+    if figure is None:
+        return "not seen", ""
+    return f"{factor * figure['value']:.2f}", f"{factor * figure['low']:.2f} to {factor * figure['high']:.2f}"
+
+
+def _text(figure: "IntervalJson", factor: float) -> str:
+    return f"{factor * figure['value']:.2f} ({factor * figure['low']:.2f} to {factor * figure['high']:.2f})"

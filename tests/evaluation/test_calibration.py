@@ -2,13 +2,16 @@
 
 import csv
 import gzip
+import json
 from dataclasses import replace
 from itertools import groupby, islice
 
 import numpy as np
 import pytest
+from pydantic_core import to_json
 from typer.testing import CliRunner
 
+from app.calibration_wire import calibration_json
 from app.cli import cli
 from app.cli_options import settings_from
 from lidarcore import Scan, SensorNoise, open_recording
@@ -173,6 +176,35 @@ def test_the_command_writes_a_noise_that_extraction_takes(data, tmp_path):
     arguments = ["calibrate", str(recording), "--skip", "5", "--scans", "100", "-o", str(profile)]
     result = CliRunner().invoke(cli, arguments, env={"COLUMNS": "120"})
     assert result.exit_code == 0, result.output
-    assert "sigma_bearing, mrad" in result.output
+    for row in ("sigma_bearing, mrad", "sigma_range, mm", "range bias, mm", "alignment, °"):
+        assert row in result.output
+    assert "sensor's x axis" in result.output.replace("\n", " ")
     scans = list(islice(open_recording(recording), 5, 105))
     assert settings_from(profile, None).extraction.noise == calibrate(scans).noise
+
+
+def test_the_command_writes_json(data):
+    recording = data / "rplidar_csv_rooms" / "mapping_keng.csv.gz"
+    result = CliRunner().invoke(cli, ["calibrate", str(recording), "--skip", "5", "--scans", "100", "--json"])
+    assert result.exit_code == 0, result.output
+    scans = list(islice(open_recording(recording), 5, 105))
+    assert json.loads(result.output) == json.loads(to_json(calibration_json(calibrate(scans))))
+
+
+def test_words_say_what_cannot_be_told():
+    """A narrow view of one wall; then a plain room, with and without a bias."""
+    world = World(np.array([[[2.0, -3.0], [2.0, 3.0]]]))
+    sensor, rng = SimulatedSensor(world, SensorNoise(0.02, 0.001), beams=3600), np.random.default_rng(0)
+    narrow = [sensor.scan(np.zeros(3), rng)[0] for _ in range(30)]
+    narrow = [replace(s, ranges=np.where(np.abs(s.bearings) < 0.15, s.ranges, np.nan)) for s in narrow]
+    bearing, bias, alignment = calibration_json(calibrate(narrow))["remarks"]
+    assert "cannot be told from 0" in bearing
+    assert "cannot be told" in bias
+    assert "cannot be told" in alignment
+    scans = standing(SensorNoise(0.005, 0.001), 8, rectangular_room(5, 4))
+    bias, alignment = calibration_json(calibrate(scans))["remarks"]
+    assert "No range bias is seen" in bias
+    longer = [replace(scan, ranges=scan.ranges + 0.03) for scan in scans]
+    assert "too long by" in calibration_json(calibrate(longer))["remarks"][0]
+    shorter = [replace(scan, ranges=scan.ranges - 0.03) for scan in scans]
+    assert "too short by" in calibration_json(calibrate(shorter))["remarks"][0]
