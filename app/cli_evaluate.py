@@ -3,7 +3,7 @@
 import errno
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli_options import RecordingPath, Set, SettingsFile, Topic, settings_from
+from app.cli_progress import ForPrograms, progress
 
 if TYPE_CHECKING:
     from lidarcore import SensorNoise
@@ -49,9 +50,13 @@ def consistency(
         typer.Option(help="keep finished parts in this file; the same command goes on from there"),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="FILE.json or FILE.csv with every figure")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="FILE.html for a report; FILE.json or FILE.csv with every figure"
+        ),
     ] = None,
     by_room: Annotated[bool, typer.Option("--by-room", help="a table for each room, too")] = False,
+    for_programs: ForPrograms = False,
 ) -> None:
     """Bias, RMS error, coverage, ANEES and ellipse areas of every fitter with both covariances."""
     from rich.console import Console
@@ -63,7 +68,7 @@ def consistency(
     from lidarcore.evaluation.trials import SEGMENTATIONS
 
     if output is not None:  # told before minutes of work are lost
-        consistency_tables.check(output)
+        consistency_tables.check(output, consistency_tables.STUDY_FORMATS)
         _check_folder(output)
     if results is not None:
         _check_folder(results)
@@ -79,8 +84,10 @@ def consistency(
         seed=seed,
     )
     started = time.perf_counter()
-    with _progress(design.chunks) as progress, _resumable(results):
-        study = monte_carlo.study(design, workers or os.cpu_count() or 1, scheduler, results, progress)
+    with progress(design.chunks, for_programs) as tell, _resumable(results):
+        study = monte_carlo.study(
+            design, workers or os.cpu_count() or 1, scheduler, results, lambda done, chunks: tell(done)
+        )
     took = time.perf_counter() - started
     console = Console()
     if not console.is_terminal:
@@ -161,16 +168,3 @@ def _resumable(results: Path | None) -> Iterator[None]:
         )
         typer.echo(f"Interrupted: {again}.", err=True)
         raise SystemExit(130) from None
-
-
-@contextmanager
-def _progress(chunks: int) -> Iterator[Callable[[int, int], None]]:
-    """A bar on the terminal, if there is one."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (BarColumn(), TaskProgressColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=chunks)
-        yield lambda done, total: bar.update(task, completed=done, total=total)

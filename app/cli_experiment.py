@@ -2,8 +2,6 @@
 
 import errno
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -12,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli_options import Topic, end_like_ctrl_c
+from app.cli_progress import ForPrograms, counted
 from lidarcore.files import write
 
 if TYPE_CHECKING:
@@ -62,6 +61,7 @@ def cwlf(
     sigma_bearing: SigmaBearing = None,
     quick: Quick = False,
     workers: Workers = None,
+    for_programs: ForPrograms = False,
 ) -> None:
     """Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time."""
     _check(output)
@@ -71,7 +71,7 @@ def cwlf(
     from lidarcore.experiments.environments import Design
 
     design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
-    with _progress(paper.PARTS) as done:
+    with counted(1 if recording else paper.PARTS, for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
     write(output, html(result))
     _tell(output, claims(result))
@@ -88,6 +88,7 @@ def wctls(
     sigma_bearing: SigmaBearing = None,
     quick: Quick = False,
     workers: Workers = None,
+    for_programs: ForPrograms = False,
 ) -> None:
     """Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty."""
     _check(output)
@@ -98,7 +99,7 @@ def wctls(
 
     whole = Design(seed=seed, split_threshold=paper.THRESHOLD)
     design = _design(whole, scans, sigma_range, sigma_bearing, quick)
-    with _progress(paper.PARTS) as done:
+    with counted(1 if recording else paper.PARTS, for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
     write(output, html(result))
     _tell(output, claims(result))
@@ -113,6 +114,7 @@ def clustering_ekf(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="one scan a second only, to try it out")] = False,
     workers: Workers = None,
+    for_programs: ForPrograms = False,
 ) -> None:
     """Four ways to cluster lidar points, with and without a Kalman filter, on three trajectories."""
     _check(output)
@@ -122,7 +124,7 @@ def clustering_ekf(
     design = paper.Design(seed=seed, runs=runs or (QUICK_RUNS if quick else paper.Design().runs))
     if quick:
         design = design.quick()
-    with _progress(design.runs * len(paper.TRAJECTORIES)) as done:
+    with counted(design.runs * len(paper.TRAJECTORIES), for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, done)
     write(output, html(result))
     typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
@@ -160,16 +162,3 @@ def _read(recording: Path | None, topic: str | None, scans: int | None) -> "list
 def _tell(output: Path, claims: "list[Claim]") -> None:
     differ = sum(agrees is False for *_, agrees in claims)
     typer.echo(f"{output}: {len(claims)} claims of the paper, {differ} of them differ from what was measured")
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[], None]]:
-    """A bar on the terminal, if there is one; call what it gives after each of the parts."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=total)
-        yield lambda: bar.advance(task)

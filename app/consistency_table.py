@@ -7,20 +7,11 @@ from operator import attrgetter
 from rich.table import Table
 
 from lidarcore.evaluation.consistency import ALL_ROOMS, Consistency, Row
-from lidarcore.evaluation.intervals import Interval
+from lidarcore.evaluation.consistency_cells import COLUMNS, cell, noise_text
+from lidarcore.evaluation.consistency_verdicts import verdict
+from lidarcore.noise import SensorNoise
 
-COLUMNS = {
-    "found": ("found", 1.0, 3),
-    "bias": ("bias mm", 1e3, 2),
-    "rms": ("RMS mm", 1e3, 2),
-    "rms_ratio": ("RMS / bound", 1.0, 3),
-    "coverage_50": ("in 50 %", 1.0, 3),
-    "coverage_95": ("in 95 %", 1.0, 3),
-    "coverage_99": ("in 99 %", 1.0, 3),
-    "anees": ("ANEES", 1.0, 2),
-    "area_ratio": ("area", 1.0, 3),
-}
-HONEST = (0.93, 0.97)  # coverage of a 95 % ellipse that can be believed
+COLOURS = {"true": "green", "open": "yellow", "too small": "red", "too large": "red"}
 
 
 def tables(study: Consistency, by_room: bool) -> Iterator[Table]:
@@ -29,8 +20,8 @@ def tables(study: Consistency, by_room: bool) -> Iterator[Table]:
     rows = sorted(study.rows() if by_room else study.pooled(), key=key)
     for (segments, room, sigma_range, sigma_bearing), group in groupby(rows, key):
         rooms = ", ".join(study.design.rooms) if room == ALL_ROOMS else room
-        noise = f"{100 * sigma_range:g} cm, {1e3 * sigma_bearing:g} mrad"
-        yield _table(f"Noise {noise}; segments {segments}; {rooms}", group)
+        noise = SensorNoise(sigma_range, sigma_bearing)
+        yield _table(f"Noise {noise_text(noise)}; segments {segments}; {rooms}", group)
 
 
 def _table(title: str, rows: Iterable[Row]) -> Table:
@@ -40,15 +31,7 @@ def _table(title: str, rows: Iterable[Row]) -> Table:
     for heading, _, _ in COLUMNS.values():
         table.add_column(heading, justify="right")
     for row in rows:
-        cells = [_cell(row.figures[name], factor, digits) for name, (_, factor, digits) in COLUMNS.items()]
-        believed = HONEST[0] <= row.figures["coverage_95"].value <= HONEST[1]
-        table.add_row(row.fitter, f"[{'green' if believed else 'red'}]{row.covariance}[/]", *cells)
+        cells = [cell(row.figures[name], factor, digits) for name, (_, factor, digits) in COLUMNS.items()]
+        colour = COLOURS[verdict(row.figures["coverage_95"])]
+        table.add_row(row.fitter, f"[{colour}]{row.covariance}[/]", *cells)
     return table
-
-
-def _cell(figure: Interval, factor: float, digits: int) -> str:
-    """A figure and half of its interval; what may as well be 0 as its upper end."""
-    low, value, high = (factor * x for x in (figure.low, figure.value, figure.high))
-    if not low > 0:
-        return f"< {high:.{digits}f}"
-    return f"{value:.{digits}f} ±{(high - low) / 2:.{digits}f}".replace("±0.", "±.")

@@ -15,6 +15,7 @@ Mask = NDArray[np.bool_]
 
 LEVELS = (0.50, 0.95, 0.99)
 GATES = -2 * np.log1p(-np.array(LEVELS))  # quantiles of chi-square with 2 degrees of freedom
+HONEST = (0.93, 0.97)  # coverage of a 95 % ellipse that can be believed
 
 # Sums over trials, the columns of a block of results.
 SUMS = (

@@ -1,10 +1,10 @@
-"""A study of consistency as a file: JSON or CSV."""
+"""A study of consistency as a file: JSON or CSV, or a report in HTML."""
 
 import csv
 import io
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -13,21 +13,32 @@ from lidarcore import files
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency import Consistency, Row
 from lidarcore.evaluation.consistency_figures import FIGURES
+from lidarcore.evaluation.consistency_report import html
 from lidarcore.evaluation.intervals import LEVEL
 
 FORMATS = (".json", ".csv")
+STUDY_FORMATS = (*FORMATS, ".html")
 
 
-def check(path: Path) -> None:
-    """Raises EvaluationError unless the file's name ends in one of FORMATS."""
-    if path.suffix.lower() not in FORMATS:
-        raise EvaluationError(f"{path.name} should end in {' or '.join(FORMATS)}: that decides the format.")
+def check(path: Path, formats: Sequence[str] = FORMATS) -> None:
+    """Raises EvaluationError unless the file's name ends in one of the formats."""
+    if path.suffix.lower() not in formats:
+        raise EvaluationError(f"{path.name} should end in {' or '.join(formats)}: that decides the format.")
 
 
 def write(study: Consistency, path: Path) -> None:
-    """Write every row with every figure and the ends of its confidence interval; empty where there is none."""
-    check(path)
-    text = to_json(study) if path.suffix.lower() == ".json" else to_csv(study.rows())
+    """Write every row with every figure and the ends of its confidence interval; empty where there is none.
+
+    The ending of the file's name, one of STUDY_FORMATS, decides the format; HTML is the report of it all.
+    """
+    check(path, STUDY_FORMATS)
+    match path.suffix.lower():
+        case ".json":
+            text = to_json(study)
+        case ".csv":
+            text = to_csv(study.rows())
+        case _:
+            text = html(study)
     files.write(path, text)
 
 

@@ -1,11 +1,13 @@
 """Chunks of a study on all cores, or on a Dask cluster; what comes out does not depend on how many there are."""
 
+import os
 import signal
+import threading
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import ExitStack, closing, contextmanager
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import TypeVar
 
 from lidarcore.errors import EvaluationError
@@ -54,7 +56,7 @@ def _on_cores(
     function: Callable[[Chunk], Outcome], chunks: Iterable[Chunk], workers: int
 ) -> Generator[tuple[Chunk, Outcome]]:
     # Spawned, not forked: threads of numerical libraries do not survive a fork.
-    pool = ProcessPoolExecutor(workers, get_context("spawn"))
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent)
     with _interrupts_blocked():
         futures = {pool.submit(function, chunk): chunk for chunk in chunks}
     try:
@@ -62,6 +64,18 @@ def _on_cores(
             yield futures[future], future.result()
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def _end_with_parent() -> None:
+    """Nothing else ends a worker whose parent was killed: the pipe that it waits at is held open by itself."""
+    threading.Thread(target=_wait_for_parent, name="parent", daemon=True).start()
+
+
+def _wait_for_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 @contextmanager

@@ -26,8 +26,18 @@ class Bar:
     style: str
 
 
-def bars(rows: Sequence[Bar | str], most: float, *, title: str, least: float | None = None) -> str:
-    """Horizontal bars under headings (str), from 0 to `most`, or logarithmically from `least` on."""
+def bars(
+    rows: Sequence[Bar | str],
+    most: float,
+    *,
+    title: str,
+    least: float | None = None,
+    mark: float | None = None,
+) -> str:
+    """Horizontal bars under headings (str), from 0 to `most`, or logarithmically from `least` on.
+
+    mark: a value at which a dashed line is drawn through all of them.
+    """
     room = WIDTH - _LABELS - _VALUES
 
     def x(value: float) -> float:
@@ -41,6 +51,8 @@ def bars(rows: Sequence[Bar | str], most: float, *, title: str, least: float | N
         else:
             parts.append(_bar(row, x, y))
         y += _ROW
+    if mark is not None:
+        parts.append(f'<path class="reference" d="M{x(mark):.1f} 4V{y:.0f}"/>')
     return svg(WIDTH, y + 4, "".join(parts), title)
 
 

@@ -1,6 +1,6 @@
 """Reports of experiments: one HTML page each, complete in itself, by day and by night, on paper and on a phone."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
 
@@ -28,13 +28,17 @@ def bullets(texts: Sequence[str]) -> str:
     return "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in texts) + "</ul>"
 
 
-def table(caption: str, headers: Sequence[str], rows: Sequence[Sequence[str]], texts: int = 1) -> str:
-    """A table of numbers; the first `texts` columns are words."""
+def table(
+    caption: str,
+    headers: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    texts: int = 1,
+    style: Callable[[str], str] = lambda cell: "",
+) -> str:
+    """A table of numbers; the first `texts` columns are words; `style` gives the CSS class of a cell."""
 
     def cells(tag: str, row: Sequence[str]) -> str:
-        return "".join(
-            f"<{tag}{' class=text' if i < texts else ''}>{escape(cell)}</{tag}>" for i, cell in enumerate(row)
-        )
+        return "".join(_cell(tag, cell, "text" if i < texts else style(cell)) for i, cell in enumerate(row))
 
     body = "".join(f"<tr>{cells('td', row)}</tr>" for row in rows)
     return _wide(f"<caption>{escape(caption)}</caption><tr>{cells('th', headers)}</tr>{body}")
@@ -54,12 +58,24 @@ def verdicts(rows: Sequence[tuple[str, str, bool | None]]) -> str:
 
 def figure(caption: str, panels: Sequence[tuple[str, str]], legend: Sequence[tuple[str, str]] = ()) -> str:
     """Panels (title, SVG) beside each other, a legend of names and CSS colours, and a caption."""
-    drawn = "".join(f"<div>{f'<p>{escape(title)}</p>' if title else ''}{svg}</div>" for title, svg in panels)
     keys = "".join(f'<span style="--of: {colour}">{escape(name)}</span>' for name, colour in legend)
     keys = f'<p class="legend">{keys}</p>' if keys else ""
-    return (
-        f'<figure>{keys}<div class="panels">{drawn}</div><figcaption>{escape(caption)}</figcaption></figure>'
-    )
+    return f"<figure>{keys}{columns(panels)}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def columns(parts: Sequence[tuple[str, str]]) -> str:
+    """Parts (title, HTML) beside each other where there is room."""
+    drawn = "".join(f"<div>{f'<p>{escape(title)}</p>' if title else ''}{html}</div>" for title, html in parts)
+    return f'<div class="panels">{drawn}</div>'
+
+
+def details(summary: str, html: str) -> str:
+    """HTML that is folded away until its summary is pressed."""
+    return f"<details><summary>{escape(summary)}</summary>{html}</details>"
+
+
+def _cell(tag: str, text: str, style: str) -> str:
+    return f"<{tag}{f' class={style}' if style else ''}>{escape(text)}</{tag}>"
 
 
 def _wide(rows: str) -> str:

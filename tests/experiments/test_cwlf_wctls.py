@@ -4,11 +4,11 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from html_tables import Tables
 
 from lidarcore import Scan
 from lidarcore.corners import intersect
@@ -56,31 +56,6 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
         return path.read_text("utf-8")
 
     return run
-
-
-class Tables(HTMLParser):
-    """The rows of cells of every table by its caption."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.rows: dict[str, list[list[str]]] = {}
-        self._caption, self._tag = "", ""
-        self.feed(text)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._tag = tag
-        if tag == "caption":
-            self._caption = ""
-        elif tag == "tr":
-            self.rows.setdefault(self._caption, []).append([])
-        elif tag in ("td", "th"):
-            self.rows[self._caption][-1].append("")
-
-    def handle_data(self, data: str) -> None:
-        if self._tag == "caption":
-            self._caption += data
-        elif self._tag in ("td", "th"):
-            self.rows[self._caption][-1][-1] += data
 
 
 def assert_complete(report: str, figures: tuple[int, ...]) -> None:
