@@ -9,9 +9,11 @@ from rich.table import Table
 
 from app.load import Load, measure_load
 from app.map_load import measure_map_queries
+from app.repeatability_load import LIMIT_PERCENT, measure_repeatability
 from lidarcore.evaluation.accuracy import measure_accuracy
 from lidarcore.evaluation.filter_speed import time_localizer, time_slam
 from lidarcore.evaluation.landmark_speed import LIMIT_MS
+from lidarcore.evaluation.repeatability_speed import time_repeatability
 from lidarcore.evaluation.speed import Timing, time_decoding, time_extraction, time_fits, time_growth
 from lidarcore.extraction import warm_up
 
@@ -20,12 +22,13 @@ SCANS, SEED = 400, 2026
 ACCURACY = {0.01: (0.995, 0.999), 0.02: (0.99, 0.99), 0.03: (0.99, 0.985), 0.05: (0.99, 0.97)}
 CORNER_RECALL, CORNER_RMS = 0.985, {0.01: 0.009}
 LOAD_SECONDS = 15.0
+TAB_SECONDS, TAB_ROUNDS = 10.0, 4
 LANDMARKS, QUESTIONS = 1_000_000, 400
 SLAM_MS = {100: 0.3, 1_000: 5.0, 3_000: None}  # landmarks: at most so long a scan
 
 
 def run() -> None:
-    """Measure and print everything; takes about five minutes."""
+    """Measure and print everything; takes about eight minutes."""
     console = Console()
     warm_up()
     console.print(f"{_processor()}, Python {platform.python_version()}, numpy {np.__version__}\n")
@@ -46,6 +49,8 @@ def run() -> None:
     console.print(_slam())
     console.print(_accuracy())
     console.print(_load())
+    console.print(_timings("Repeatability: the furnished room, 100 scans, six methods", time_repeatability()))
+    console.print(_tab())
     console.print(_queries())
 
 
@@ -122,6 +127,18 @@ def _load() -> Table:
             _judged(str(load.lag), load.lag <= 1),
             f"{load.memory_growth / 1e6:+.1f} MB",
         )
+    return table
+
+
+def _tab() -> Table:
+    cost = measure_repeatability(TAB_SECONDS, TAB_ROUNDS)
+    table = _table(
+        f"Server with an emulated sensor at 10 Hz, one browser; in turn {TAB_ROUNDS} times {TAB_SECONDS:.0f} s each",
+        "Repeatability tab: 100 scans, six methods", "CPU % of a core",
+    )  # fmt: skip
+    table.add_row("off", cost.off.text(1))
+    table.add_row("on", cost.on.text(1))
+    table.add_row("more", _judged(cost.added.text(1), cost.added.value <= LIMIT_PERCENT))
     return table
 
 

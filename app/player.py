@@ -58,6 +58,7 @@ class Player:
         self._source, self._paused = source, paused
         self._hand_over, self._is_idle, self._on_change = hand_over, is_idle, changed
         self._opened = 0  # how many sources before this one
+        self._seeks = 0
         self._index = 0
         self._wanted = True  # the scan at the index is still to be handed over
         self._ended = False
@@ -176,6 +177,7 @@ class Player:
 
     def _seek(self, index: int) -> None:
         self._index = self._source.nearest(index)
+        self._seeks += 1
         self._wanted, self._ended = True, False
         self._condition.notify()
 
@@ -240,5 +242,5 @@ class Player:
         # What is looked at again is not late.
         arrival = time.monotonic() if self._paused else self._source.arrival(self._index)
         name = self._source.name or self._source.kind
-        self._hand_over(Taken(scan, name, position, self._opened, arrival))
+        self._hand_over(Taken(scan, name, position, self._opened, self._seeks, arrival))
         return True

@@ -2,7 +2,6 @@
 
 from rich.table import Table
 
-from app.consistency_table import HONEST
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.evaluation.repeatability_summary import Box, Summary
 
@@ -23,10 +22,9 @@ def table(summary: Summary) -> Table:
     for method in summary.methods:
         for kind, claim in method.claims.items():
             judged = claim.judgement
-            believed = judged.coverage_95.low <= HONEST[1] and judged.coverage_95.high >= HONEST[0]
             result.add_row(
                 method.name,
-                f"[{'green' if believed else 'red'}]{kind}[/]",
+                f"[{'green' if claim.verdict == 'true' else 'red'}]{kind}[/]",
                 str(len(method.corners)),
                 *_box(claim.areas),
                 "" if method.actual_area is None else f"{MM2 * method.actual_area:.2f}",

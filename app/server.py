@@ -31,24 +31,30 @@ from app.api import (
     source,
     studies,
 )
+from app.calibration import LiveCalibration
 from app.landmark_store import LandmarkStore
 from app.library import MAX_BYTES, Library
 from app.live import DeviceOptions, Taps, connected_or_emulated
 from app.metrics import Metrics, metrics_router
 from app.navigation import Navigation
+from app.profiles import Profiles
 from app.recorder import AsyncRecorder
+from app.repeatability import LiveRepeatability
 from app.runtime import Runtime, UnknownCornerError
 from app.scene import Scene
 from app.security import Guard
 from app.settings import Settings
 from app.sources import RecordingSource, Source
 from app.stream import Hub
+from app.studies import Studies
 from app.viser_mount import ViserMount
 from lidarcore import Scan, extract
 from lidarcore.errors import LandmarkMapError
 
 API = "/api/v1"
 MAP_FILE = "landmarks.db"
+STUDIES = "studies"
+PROFILES = "profiles"
 ROOMS = (
     frame, clusters, localization, landmarks, map, sessions, repeatability, calibration, studies, settings, source,
     sensor, recordings, recorder, selection, meta,
@@ -87,6 +93,12 @@ def create_app(options: ServerOptions) -> FastAPI:
     runtime = Runtime(first, options.settings, Navigation(store), scene.draw)
     hub = Hub(runtime, recording, store, measured.sent)
     measured.watch(runtime, hub, recording)
+    standing = LiveRepeatability()
+    runtime.frame_listeners.append(standing.tell)
+    calibrating = LiveCalibration(runtime.player)
+    runtime.frame_listeners.append(calibrating.tell)
+    runtime.change_listeners.append(calibrating.look)
+    laboratory = Studies(options.recordings.parent / STUDIES)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
@@ -95,6 +107,8 @@ def create_app(options: ServerOptions) -> FastAPI:
         yield
         hub.close()
         runtime.close()
+        laboratory.close()
+        standing.close()
         recording.stop()
         store.close()
         mount.close()
@@ -109,8 +123,12 @@ def create_app(options: ServerOptions) -> FastAPI:
         responses=problems.documented(422),
     )
     app.state.runtime, app.state.hub, app.state.viser = runtime, hub, mount.server
+    app.state.studies = laboratory
     app.state.library = Library(options.recordings, options.max_bytes, options.recording)
     app.state.recorder, app.state.taps, app.state.landmarks = recording, taps, store
+    app.state.repeatability = standing
+    app.state.calibration = calibrating
+    app.state.profiles = Profiles(options.recordings.parent / PROFILES)
     problems.install(app)
     problems.document(app)
     api = APIRouter(prefix=API)
@@ -164,5 +182,13 @@ def _add_page(app: FastAPI) -> None:
     @app.get("/", include_in_schema=False)
     def page() -> FileResponse:
         return FileResponse(STATIC / "index.html")
+
+    @app.get("/studies", include_in_schema=False)
+    def studies_page() -> FileResponse:
+        return FileResponse(STATIC / "studies.html")
+
+    @app.get("/guide", include_in_schema=False)
+    def guide() -> FileResponse:
+        return FileResponse(STATIC / "guide.html")
 
     app.mount("/static", StaticFiles(directory=STATIC), name="static")

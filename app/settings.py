@@ -9,6 +9,8 @@ from pydantic_core import InitErrorDetails, to_json
 
 from lidarcore import FITTERS, ExtractionSettings
 from lidarcore.clusters import ClusterSettings
+from lidarcore.evaluation.repeatability import WINDOW
+from lidarcore.evaluation.scatter import LEAST
 from lidarcore.localization import NavigationSettings
 
 Colour = Literal["plain", "segment", "quality", "range"]
@@ -71,8 +73,17 @@ class ViewSettings(_Frozen):
         return tuple(dict.fromkeys(names))
 
 
+class RepeatabilitySettings(_Frozen):
+    """Whether the scatter of the corners is held against what each method claims, while the sensor stands still."""
+
+    running: Annotated[bool, Field(description="whether scans are watched for it")] = False
+    window: Annotated[int, Field(ge=LEAST, le=1000, description="over how many scans, the newest ones")] = (
+        WINDOW
+    )
+
+
 class Settings(_Frozen):
-    """All settings: of the extraction, of the clusters, of localization and of the view.
+    """All settings: of the extraction, of the clusters, of localization, of the view and of repeatability.
 
     There is one sensor, so `clusters.noise` always is `extraction.noise`.
     """
@@ -81,6 +92,7 @@ class Settings(_Frozen):
     clusters: ClusterSettings = ClusterSettings()
     navigation: NavigationSettings = NavigationSettings()
     view: ViewSettings = ViewSettings()
+    repeatability: RepeatabilitySettings = RepeatabilitySettings()
 
     @property
     def methods(self) -> tuple[str, ...]:

@@ -14,4 +14,5 @@ class Taken:
     name: str
     position: PositionJson
     source: int  # changes with every source opened
+    seeks: int  # changes whenever someone goes to another scan of it
     arrival: float

@@ -5,14 +5,18 @@ from typing import Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
+from app.calibration import LiveCalibration
 from app.frame import Frame
 from app.landmark_store import LandmarkStore
 from app.library import Library
 from app.live import Taps
 from app.problems import ProblemError
+from app.profiles import Profiles
 from app.recorder import AsyncRecorder
+from app.repeatability import LiveRepeatability
 from app.runtime import Runtime
 from app.stream import Hub
+from app.studies import Studies
 
 
 def _runtime(connection: HTTPConnection) -> Runtime:
@@ -45,6 +49,26 @@ async def _landmarks(connection: HTTPConnection) -> LandmarkStore:
     return landmarks
 
 
+def _repeatability(connection: HTTPConnection) -> LiveRepeatability:
+    repeatability: LiveRepeatability = connection.app.state.repeatability
+    return repeatability
+
+
+def _calibration(connection: HTTPConnection) -> LiveCalibration:
+    calibration: LiveCalibration = connection.app.state.calibration
+    return calibration
+
+
+def _profiles(connection: HTTPConnection) -> Profiles:
+    profiles: Profiles = connection.app.state.profiles
+    return profiles
+
+
+def _studies(connection: HTTPConnection) -> Studies:
+    studies: Studies = connection.app.state.studies
+    return studies
+
+
 def _frame(runtime: Annotated[Runtime, Depends(_runtime)]) -> Frame:
     if runtime.frame is None:
         why = "no scan has been processed" if runtime.ready else "the kernels are still being compiled"
@@ -58,4 +82,8 @@ CurrentHub = Annotated[Hub, Depends(_hub)]
 CurrentRecorder = Annotated[AsyncRecorder, Depends(_recorder)]
 CurrentTaps = Annotated[Taps, Depends(_taps)]
 CurrentLandmarks = Annotated[LandmarkStore, Depends(_landmarks)]
+CurrentRepeatability = Annotated[LiveRepeatability, Depends(_repeatability)]
+CurrentCalibration = Annotated[LiveCalibration, Depends(_calibration)]
+CurrentProfiles = Annotated[Profiles, Depends(_profiles)]
+CurrentStudies = Annotated[Studies, Depends(_studies)]
 CurrentFrame = Annotated[Frame, Depends(_frame)]

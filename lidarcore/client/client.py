@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self, Unpack
+from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -181,6 +182,47 @@ class Client:
             SeenCorner(id, np.array([one["x"], one["y"]]), np.array(one["covariance"]), one["angle"])
             for id, one in seen
         ]
+
+    def repeatability(self) -> dict[str, Any]:
+        """What each method claims of the corners, and how they scatter: as GET /api/v1/repeatability describes.
+
+        Switched on by `client.set(repeatability={"running": True})` while the sensor stands still.
+        """
+        found: dict[str, Any] = self._connection.get("/repeatability")
+        return found
+
+    def calibrate(self, scans: int = 100) -> dict[str, Any]:
+        """Begin to measure the noise of a sensor that stands still, from its next scans; see `calibration`."""
+        state: dict[str, Any] = self._connection.send("POST", "/calibration", {"scans": scans})
+        return state
+
+    def calibration(self) -> dict[str, Any]:
+        """The calibration under way, or the last one: as GET /api/v1/calibration describes."""
+        state: dict[str, Any] = self._connection.get("/calibration")
+        return state
+
+    def profiles(self) -> list[dict[str, Any]]:
+        """The noise profiles that were saved: name, noise, or the problem with the file."""
+        profiles: list[dict[str, Any]] = self._connection.get("/profiles")["profiles"]
+        return profiles
+
+    def save_profile(
+        self, name: str, sigma_range: float, sigma_bearing: float, *, overwrite: bool = False
+    ) -> None:
+        """Save a noise (m, rad) as a profile of the server."""
+        noise = {"sigma_range": sigma_range, "sigma_bearing": sigma_bearing}
+        query = "?overwrite=true" if overwrite else ""
+        self._connection.send(
+            "PUT", f"/profiles/{quote(name, safe='')}{query}", {"extraction": {"noise": noise}}
+        )
+
+    def use_profile(self, name: str) -> dict[str, Any]:
+        """Let extraction take the noise of a profile. All settings then."""
+        return self.set(**self._connection.get(f"/profiles/{quote(name, safe='')}"))
+
+    def delete_profile(self, name: str) -> None:
+        """Delete a profile."""
+        self._connection.ask("DELETE", f"/profiles/{quote(name, safe='')}")
 
     def settings(self) -> dict[str, Any]:
         """All settings, section by section."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency_design import KINDS
-from lidarcore.evaluation.repeatability_summary import WHISKER, Box, Claim, Method, Summary
+from lidarcore.evaluation.repeatability_summary import WHISKER, Box, Claim, Method, Summary, verdict
 from lidarcore.evaluation.scatter import (
     LEAST,
     SIGHTING,
@@ -93,6 +93,18 @@ class Repeatability:
         methods = tuple(_method(name, m, found, areas[:, m]) for m, name in enumerate(self.methods))
         return Summary(self.window, len(self._records), self._message(found), methods)
 
+    def deviations(self, corner: int) -> dict[str, Array]:
+        """(N, 2) m by method: where it saw the corner of that id, from the mean over the window, the oldest first.
+
+        Raises EvaluationError for a corner that was not seen in the window.
+        """
+        corners = self._sightings()
+        seen = corners.table[corners.ids == corner, :, :2]
+        if not len(seen):
+            known = np.unique(corners.ids).tolist()
+            raise EvaluationError(f"There is no corner {corner} in the window; it has {known}.")
+        return {name: _centred(seen[:, m]) for m, name in enumerate(self.methods)}
+
     def _record(self, features: Mapping[str, Features]) -> _Record:
         rows = self._tracker.rows(features)
         table = np.full((len(rows), len(self.methods), SIGHTING), np.nan)
@@ -133,6 +145,12 @@ def _places(table: Array) -> Array:
     return places
 
 
+def _centred(xy: Array) -> Array:
+    """From their mean, those that are not NaN."""
+    found: Array = xy[np.isfinite(xy[:, 0])]
+    return found - found.mean(0) if len(found) else found
+
+
 def _medians(values: Array) -> Array:
     """Over the first axis, without NaN; NaN where there is nothing else."""
     ordered = np.sort(values, axis=0)  # NaN last
@@ -146,8 +164,10 @@ def _medians(values: Array) -> Array:
 def _method(name: str, m: int, found: Scatter, areas: Array) -> Method:
     corners = tuple(found.corners(m))
     actual = float(np.median([corner.area for corner in corners])) if corners else None
+    judged = [found.judgement(m, k) for k in range(len(KINDS))]
     claims: dict[str, Claim] = {
-        kind: Claim(_box(areas[:, k]), found.judgement(m, k)) for k, kind in enumerate(KINDS)
+        kind: Claim(_box(areas[:, k]), judged[k], verdict(judged[k].coverage_95))
+        for k, kind in enumerate(KINDS)
     }
     return Method(name, actual, claims, corners)
 

@@ -1,11 +1,14 @@
 """What repeatability is told as: plain figures, in m and m², that `dataclasses.asdict` makes ready for JSON."""
 
 from dataclasses import dataclass
+from typing import Literal
 
+from lidarcore.evaluation.consistency_figures import HONEST
 from lidarcore.evaluation.intervals import Interval
 
 WHISKER = 1.5  # times the distance between the quartiles
 
+Verdict = Literal["too small", "true", "too large"]
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
 
@@ -18,6 +21,15 @@ class Judgement:
     coverage_50: Interval
     coverage_95: Interval
     coverage_99: Interval
+
+
+def verdict(coverage: Interval) -> Verdict | None:
+    """Of ellipses that should hold 95 %: wrong if the whole interval says so; None where nothing is known."""
+    if coverage.high < HONEST[0]:
+        return "too small"
+    if coverage.low > HONEST[1]:
+        return "too large"
+    return "true" if coverage.value == coverage.value else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,10 +74,15 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class Claim:
-    """areas: of the one-sigma ellipses, each scan's median over its corners; None while no corner was found."""
+    """What one method says by one kind of covariance, and whether it is so.
+
+    areas     of the one-sigma ellipses, each scan's median over its corners; None while no corner was found
+    verdict   on the 95 % ellipses of all corners together; None while no corner is judged
+    """
 
     areas: Box | None
     judgement: Judgement
+    verdict: Verdict | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,6 +44,7 @@ def _lines(summary: Summary) -> Iterator[dict[str, Any]]:
                 "scans": summary.scans,
                 "corners": len(method.corners),
                 "actual_area": method.actual_area,
+                "verdict": claim.verdict,
             }
             for name in ("low", "first_quartile", "median", "third_quartile", "high"):
                 line["claimed_area_" + name] = None if box is None else getattr(box, name)

@@ -24,6 +24,8 @@ const NAMED = {
   motion: { path: "navigation.motion", read: String },
   clusters: { path: "clusters.method", read: String },
   rotate: { path: "view.rotate", read: (text) => text === "true" },
+  repeatability: { path: "repeatability.running", read: (text) => text === "true" },
+  window: { path: "repeatability.window", read: Number },
 };
 
 const at = (object, path) => path.split(".").reduce((node, key) => node?.[key], object);

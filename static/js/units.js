@@ -30,6 +30,7 @@ export const metres = (value) => fixed(value, 3);
 export const millimetres = (value) => fixed(value * 1e3, Math.abs(value) < 0.1 ? 1 : 0);
 export const wholeMillimetres = (value) => fixed(value * 1e3, 0);
 export const degrees = (value) => fixed(value / DEGREE, 1);
+export const fineDegrees = (value) => fixed(value / DEGREE, 3);
 export const squareMillimetres = (value) => fixed(value * 1e6, Math.abs(value) < 1e-5 ? 1 : 0);
 
 /** A duration given in microseconds: three digits and a unit that fits. */
@@ -57,6 +58,14 @@ export function clock(seconds) {
   const tenths = Math.round(seconds * 10);
   const rest = ((tenths % 600) / 10).toFixed(1).padStart(4, "0");
   return `${Math.floor(tenths / 600)}:${rest}`;
+}
+
+/** A duration in seconds as people say it: 8 s, 2 min, 1.5 h. */
+export function duration(seconds) {
+  if (!Number.isFinite(seconds)) return UNKNOWN;
+  if (seconds < 100) return `${Math.round(seconds)}\u2009s`;
+  if (seconds < 6000) return `${Math.round(seconds / 60)}\u2009min`;
+  return `${fixed(seconds / 3600, 1)}\u2009h`;
 }
 
 /** A stamp in seconds as a time of the day, with the date if that is another; stamps of some logs count from their start. */

@@ -81,6 +81,9 @@ def test_a_claim_halved_or_doubled_is_caught_with_its_figure(factor):
         assert getattr(wrong, name).contains(expected)
         assert not getattr(wrong, name).contains(level)
         assert getattr(right, name).contains(level)
+    claims = summary.methods[0].claims
+    assert claims["consistent"].verdict == ("too small" if factor < 1 else "too large")
+    assert claims["published"].verdict == "true"
     assert wrong.area_ratio.contains(factor)
     assert not wrong.area_ratio.contains(1)
     for corner in summary.methods[0].corners:
@@ -117,6 +120,10 @@ def test_scatter_and_mean_are_those_of_numpy_over_the_last_scans_only():
         assert corner.count == 25
         np.testing.assert_allclose(corner.mean, last[:, k].mean(0))
         np.testing.assert_allclose(corner.scatter, np.cov(last[:, k].T))
+        deviations = study.deviations(corner.id)[METHOD]
+        np.testing.assert_allclose(deviations, last[:, k] - last[:, k].mean(0), atol=1e-15)
+    with pytest.raises(EvaluationError, match="no corner 999"):
+        study.deviations(999)
 
 
 def test_corners_that_vanish_and_come_back_are_the_same_and_counted_when_seen():
@@ -226,6 +233,7 @@ def test_a_sensor_without_noise_and_one_that_sees_nothing_give_figures_that_can_
     for _ in range(20):
         empty.add(found(PLACES[:0], COVARIANCE))
     assert "No corner was seen in 10 of the last 20 scans" in empty.summary().message
+    assert empty.summary().methods[0].claims["consistent"].verdict is None
     for each in (study, empty):
         assert "NaN" not in to_json(each.summary())
         assert "nan" not in to_csv(each.summary())
