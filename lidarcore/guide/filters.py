@@ -62,7 +62,7 @@ def _run(situation: Situation, methods: Sequence[Method], steps: int, rng: np.ra
     sensor = SimulatedSensor(world, situation.noise)
     poses = _way(situation, steps, rng)
     odometry = _driven(poses, rng)
-    start = rng.multivariate_normal(poses[0], _START)
+    start = rng.multivariate_normal(poses[0], _START, method="cholesky")
     known = Points(world.walls[:, 0], _SURVEYED**2 * np.eye(2))
     localizers = {method: Localizer(known, start, _START, SETTINGS) for method in methods}
     settings, fitters = ExtractionSettings(noise=situation.noise), list(dict.fromkeys(f for f, _ in methods))
@@ -103,5 +103,7 @@ def _driven(poses: Array, rng: np.random.Generator) -> Array:
     for before, after in pairwise(poses):
         u = compose(inverse(before), after)
         noise = SETTINGS.odometry.covariance(u, _PERIOD)
-        odometry.append(compose(odometry[-1], u + rng.multivariate_normal(np.zeros(3), noise)))
+        odometry.append(
+            compose(odometry[-1], u + rng.multivariate_normal(np.zeros(3), noise, method="cholesky"))
+        )
     return np.array(odometry)

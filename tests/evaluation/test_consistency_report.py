@@ -101,7 +101,7 @@ def gaussian(spoiled: Callable[[str, str], float], draws: int) -> Consistency:
     truth = np.array([[4e-4, 1e-4], [1e-4, 2e-4]])
 
     def sums(fitter: str, kind: str) -> np.ndarray:
-        errors = rng.multivariate_normal([0, 0], truth, (20, draws))
+        errors = rng.multivariate_normal([0, 0], truth, (20, draws), method="cholesky")
         claims = np.broadcast_to(truth * spoiled(fitter, kind), (*errors.shape[:2], 2, 2))
         corners = rng.uniform(1, 4, (20, 2))
         return tally(Trials(errors, claims, np.broadcast_to(truth, (20, 2, 2)), corners))

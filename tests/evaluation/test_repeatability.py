@@ -44,7 +44,11 @@ def gaussian(scans, claim=COVARIANCE, seed=0, places=PLACES, window=100, publish
     rng, study = np.random.default_rng(seed), Repeatability(window, [METHOD])
     for _ in range(scans):
         study.add(
-            found(places + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(places)), claim, published)
+            found(
+                places + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(places), method="cholesky"),
+                claim,
+                published,
+            )
         )
     return study
 
@@ -112,7 +116,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 def test_scatter_and_mean_are_those_of_numpy_over_the_last_scans_only():
     rng, study, window = np.random.default_rng(3), Repeatability(25, [METHOD]), []
     for _ in range(70):
-        window.append(PLACES + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(PLACES)))
+        window.append(
+            PLACES + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(PLACES), method="cholesky")
+        )
         study.add(found(window[-1], COVARIANCE))
     summary, last = study.summary(), np.array(window[-25:])
     assert (summary.scans, summary.window, summary.message) == (25, 25, None)
@@ -130,7 +136,12 @@ def test_corners_that_vanish_and_come_back_are_the_same_and_counted_when_seen():
     rng, study = np.random.default_rng(4), Repeatability(100, [METHOD])
     for i in range(100):
         there = PLACES if not 30 <= i < 70 else PLACES[:-2]
-        study.add(found(there + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(there)), COVARIANCE))
+        study.add(
+            found(
+                there + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(there), method="cholesky"),
+                COVARIANCE,
+            )
+        )
     method = study.summary().methods[0]
     assert [corner.count for corner in method.corners] == [100, 100, 100, 60, 60]
     assert method.claims["consistent"].judgement.area_ratio.contains(1)
@@ -167,7 +178,10 @@ def test_a_sensor_at_rest_is_not_said_to_move():
     rng, study = np.random.default_rng(6), Repeatability(100, [METHOD])
     for _ in range(1500):
         study.add(
-            found(PLACES + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(PLACES)), 0.01 * COVARIANCE)
+            found(
+                PLACES + rng.multivariate_normal(np.zeros(2), COVARIANCE, len(PLACES), method="cholesky"),
+                0.01 * COVARIANCE,
+            )
         )
         assert len(study) > 0
     assert study.summary().message is None

@@ -87,7 +87,9 @@ def test_in_a_map_begun_anew_all_moves_and_turns_with_its_origin(heading: float)
     rng, origin = np.random.default_rng(2), np.array([3.0, -1.0, heading])
     C = np.array([[0.5, 0.1, 0.02], [0.1, 0.8, -0.03], [0.02, -0.03, 0.01]]) / 100
     pose, local = np.array([5.0, 2.0, 0.3]), compose(inverse(origin), np.array([5.0, 2.0, 0.3]))
-    drawn = np.array([compose(start, local) for start in rng.multivariate_normal(origin, C, 50_000)])
+    drawn = np.array(
+        [compose(start, local) for start in rng.multivariate_normal(origin, C, 50_000, method="cholesky")]
+    )
     scan, exact = next(living_room("standing", 1)), 1e-12 * np.eye(3)
     estimate = Navigator(SLAM).step(scan, extract(scan, EXTRACTION)).estimate
     begun = MapOrigin(origin, C)

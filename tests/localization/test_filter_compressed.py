@@ -125,7 +125,7 @@ def test_the_compressed_filter_is_the_full_filter(
         order = np.array([names.index(k) for k in seen], np.int64)
         if len(order):
             points = (world[seen] - truth[:2]) @ np.array([[c, -s], [s, c]])
-            points += rng.multivariate_normal([0, 0], NOISE, len(seen))
+            points += rng.multivariate_normal([0, 0], NOISE, len(seen), method="cholesky")
             R = np.tile(NOISE, (len(seen), 1, 1))
             near_ones = compressed.within_reach(points, R, GATE)
             assert step % 10 or set(full.gated(points)) <= set(near_ones)
@@ -196,7 +196,12 @@ def test_the_covariance_stays_positive_definite_over_many_changes_of_the_active_
         compressed.predict(compressed.state.copy(), np.eye(3), np.diag([1e-2, 1e-2, 1e-3]) ** 2)
         R = np.tile(NOISE, (len(order), 1, 1))
         z, S = compressed.jointly_expected(order, R)
-        innovation = world[order] - state[:2] + rng.multivariate_normal([0, 0], NOISE, len(order)) - z
+        innovation = (
+            world[order]
+            - state[:2]
+            + rng.multivariate_normal([0, 0], NOISE, len(order), method="cholesky")
+            - z
+        )
         pairs = Association(order, order, none, none, none[0:0, 0], none[0:0, 0])
         compressed.within_reach(z, R, GATE)
         compressed.correct(Innovation(pairs, 0.01 * innovation, S), R)

@@ -125,7 +125,7 @@ def test_an_error_of_odometry_is_one_of_the_pose_and_of_the_velocity(turned: flo
     model = OdometryWithVelocity(noise, accelerations)
     start = np.array([1.0, 2.0, 0.7, 9.0, 9.0, 9.0])
     _, F, Q = model.predict(start, dt, increment)
-    drawn = rng.multivariate_normal(increment, noise.covariance(increment, dt), 100_000)
+    drawn = rng.multivariate_normal(increment, noise.covariance(increment, dt), 100_000, method="cholesky")
     ends = np.array([move(start[:3], moved)[0] for moved in drawn])
     velocities = drawn[:, [0, 2, 1]] / dt
     changes = rng.normal(size=velocities.shape) * np.sqrt(

@@ -37,7 +37,7 @@ def matched(
     reference: Scan, scan: Scan, step: Array, noise: SensorNoise, rng: np.random.Generator
 ) -> tuple[Array, ScanMatch]:
     """Error (3,) of a match from a guess with errors as its covariance says, and the match."""
-    guess = step + rng.multivariate_normal(np.zeros(3), GUESS)
+    guess = step + rng.multivariate_normal(np.zeros(3), GUESS, method="cholesky")
     match = match_scans(reference, scan, guess, GUESS, MatchSettings(noise=noise))
     error = match.pose - step
     error[2] = wrap(error[2])

@@ -21,7 +21,8 @@ def ring(rng):
         graph.add(pose + rng.normal(0, 0.2, 3))
     ends = [(k, k + 1) for k in range(8)] + [(8, 0), (2, 6), (7, 1)]
     relatives = [
-        compose(inverse(TRUE[i]), TRUE[j]) + rng.multivariate_normal(np.zeros(3), P) for i, j in ends
+        compose(inverse(TRUE[i]), TRUE[j]) + rng.multivariate_normal(np.zeros(3), P, method="cholesky")
+        for i, j in ends
     ]
     for (i, j), relative in zip(ends, relatives, strict=True):
         graph.connect(i, j, relative, P)

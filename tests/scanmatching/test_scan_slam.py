@@ -54,7 +54,8 @@ def drive(poses, rng, scanned=sick_scan, odometry=True) -> list[Scan]:
         if k:
             u = compose(inverse(poses[k - 1]), pose)
             driven = compose(
-                driven, u + rng.multivariate_normal(np.zeros(3), SETTINGS.odometry.covariance(u))
+                driven,
+                u + rng.multivariate_normal(np.zeros(3), SETTINGS.odometry.covariance(u), method="cholesky"),
             )
         scan = scanned(BUILDING, pose, NOISE, rng)
         scans.append(replace(scan, stamp=float(k), odometry=driven if odometry else None))
