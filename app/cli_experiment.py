@@ -11,7 +11,6 @@ import typer
 
 from app.cli_options import Topic, end_like_ctrl_c
 from app.cli_progress import ForPrograms, counted
-from lidarcore.files import write
 
 if TYPE_CHECKING:
     from lidarcore import Scan
@@ -65,6 +64,7 @@ def cwlf(
 ) -> None:
     """Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time."""
     _check(output)
+    from lidarcore import files
     from lidarcore.experiments import cwlf as paper
     from lidarcore.experiments.cwlf_claims import claims
     from lidarcore.experiments.cwlf_report import html
@@ -73,7 +73,7 @@ def cwlf(
     design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
     with counted(1 if recording else paper.PARTS, for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    write(output, html(result))
+    files.write(output, html(result))
     _tell(output, claims(result))
 
 
@@ -92,6 +92,7 @@ def wctls(
 ) -> None:
     """Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty."""
     _check(output)
+    from lidarcore import files
     from lidarcore.experiments import wctls as paper
     from lidarcore.experiments.environments import Design
     from lidarcore.experiments.wctls_claims import claims
@@ -101,7 +102,7 @@ def wctls(
     design = _design(whole, scans, sigma_range, sigma_bearing, quick)
     with counted(1 if recording else paper.PARTS, for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    write(output, html(result))
+    files.write(output, html(result))
     _tell(output, claims(result))
 
 
@@ -118,6 +119,7 @@ def clustering_ekf(
 ) -> None:
     """Four ways to cluster lidar points, with and without a Kalman filter, on three trajectories."""
     _check(output)
+    from lidarcore import files
     from lidarcore.experiments import clustering_ekf as paper
     from lidarcore.experiments.clustering_ekf_report import html
 
@@ -126,7 +128,7 @@ def clustering_ekf(
         design = design.quick()
     with counted(design.runs * len(paper.TRAJECTORIES), for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, done)
-    write(output, html(result))
+    files.write(output, html(result))
     typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
 
 

@@ -4,6 +4,7 @@ The recordings lie beside the checkout: their licences do not allow shipping mos
 """
 
 import os
+import signal
 from pathlib import Path
 
 import hypothesis
@@ -15,8 +16,21 @@ DATA = Path(__file__).parents[2] / "shared" / "data"
 
 
 # The same examples on every run, so that a failure is a change of the code and not of the dice.
-hypothesis.settings.register_profile("repeatable", deadline=None, derandomize=True, max_examples=100)
+# A machine that is busy is no reason to fail either.
+hypothesis.settings.register_profile(
+    "repeatable",
+    deadline=None,
+    derandomize=True,
+    max_examples=100,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
 hypothesis.settings.load_profile("repeatable")
+
+# What nohup, or a shell in the background, has us ignore is passed on to every program that we start; what we catch
+# is not.
+for ignored in (signal.SIGINT, signal.SIGHUP):
+    if signal.getsignal(ignored) == signal.SIG_IGN:
+        signal.signal(ignored, lambda *_: None)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -9,19 +9,14 @@ import pytest
 from processes import Serving
 from sensing import watch
 from serving import SINCE, Server, write_room
+from waiting import free_port
 
-from app.serve import listen
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
 
-@pytest.fixture
-def free_port() -> Callable[[], int]:
-    def find() -> int:
-        with listen("127.0.0.1", 0) as listening:
-            port: int = listening.getsockname()[1]
-            return port
-
-    return find
+@pytest.fixture(name="free_port")
+def find_port() -> Callable[[], int]:
+    return free_port
 
 
 @pytest.fixture

@@ -49,5 +49,5 @@ class Serving:
         """Press Ctrl-C, or send another signal; how long it takes to end, and what it says about it."""
         started = time.perf_counter()
         self.process.send_signal(number)
-        _, said = self.process.communicate(timeout=20)
+        _, said = self.process.communicate(timeout=60)
         return time.perf_counter() - started, said

@@ -14,11 +14,14 @@ from urllib.parse import urlsplit
 import httpx
 import numpy as np
 import viser
+from waiting import PATIENCE
+from waiting import wait_until as wait_until
 from websockets.sync.client import ClientConnection, connect
 
 from app.runtime import Runtime
 from app.serve import listen, uvicorn_server
 from app.server import ServerOptions, create_app
+from lidarcore import open_recording
 
 ROOT = Path(__file__).parents[2]
 CORNERS = np.array([[3.5, 2.2], [-2.5, 2.2], [-2.5, -1.8], [3.5, -1.8]])  # m, in the sensor frame
@@ -39,7 +42,7 @@ class Server:
         self._listening = listen("127.0.0.1", 0)
         self.port: int = self._listening.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
-        self.http = httpx.Client(base_url=f"{self.url}/api/v1", timeout=30)
+        self.http = httpx.Client(base_url=f"{self.url}/api/v1", timeout=PATIENCE)
         self._server = uvicorn_server(app)
         self._thread = threading.Thread(
             target=lambda: asyncio.run(self._server.serve(sockets=[self._listening])), daemon=True
@@ -49,7 +52,7 @@ class Server:
     def stop(self) -> None:
         self.http.close()
         self._server.should_exit = True
-        self._thread.join(timeout=10)
+        self._thread.join(timeout=PATIENCE)
         assert not self._thread.is_alive(), "the server did not stop"
         self._maps.cleanup()
 
@@ -71,10 +74,16 @@ class Server:
             return stream.frame(lambda frame: frame["sequence"] > newest["sequence"])
 
     def play(self, path: Path, **options: Any) -> Json:
-        """Play that file of the folder from its first scan, and return the first frame of it."""
+        """Play that file of the folder, and return a frame of it: of a recording that begins when it does."""
+        begins = next(iter(open_recording(path, options.get("topic")))).stamp
+
+        def is_of_it(frame: Json) -> bool:
+            source = frame["source"]
+            return source["kind"] == "recording" and abs(frame["stamp"] - source["time"] - begins) < 1e-3
+
         with self.stream() as stream:
             self.change("PUT", "/source", {"kind": "recording", "name": path.name, **options})
-            return stream.frame(lambda frame: chosen(frame) and frame["source"]["kind"] == "recording")
+            return stream.frame(is_of_it)
 
     def recordings(self) -> list[Json]:
         """The entries of what is in the folder: without what comes along, or was given at the start."""
@@ -89,13 +98,15 @@ class Stream:
         self.websocket = websocket
 
     def message(self) -> Json:
-        return strict_json(self.websocket.recv(timeout=30))
+        return strict_json(self.websocket.recv(timeout=PATIENCE))
 
     def until(self, kind: str, holds: Callable[[Json], object]) -> Json:
-        while True:
+        end = time.monotonic() + 2 * PATIENCE
+        while time.monotonic() < end:
             message = self.message()
             if message["type"] == kind and holds(message):
                 return message
+        raise AssertionError(f"no {kind} of which that holds")
 
     def frame(self, holds: Callable[[Json], object] = bool) -> Json:
         return self.until("frame", holds)
@@ -107,14 +118,6 @@ class Stream:
 def chosen(frame: Json) -> bool:
     """The scan is not of the recording that a server plays until it is told what to play."""
     return not SINCE <= frame["stamp"] < SINCE + 100
-
-
-def wait_until(holds: Callable[[], object], seconds: float = 20) -> None:
-    """For what no event tells of, such as what is on the disk."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it did not come true"
-        time.sleep(0.01)
 
 
 def strict_json(text: str | bytes) -> Any:

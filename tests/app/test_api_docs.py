@@ -9,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from serving import Json, Server, strict_json
 
 import lidarcore
+from app.api.calibration import ProfilesJson
 from app.api.landmarks import LandmarkHistoryJson, LandmarksJson, NeighboursJson
 from app.api.localization import TrajectoryJson, WhereJson
 from app.api.meta import HealthJson, MethodsJson, VersionJson
@@ -17,10 +18,15 @@ from app.api.selection import SelectionBody
 from app.api.sensor import FoundDeviceJson
 from app.api.sessions import SessionJson, SessionsJson
 from app.api.source import SimulationJson
+from app.api.studies import StudiesJson
+from app.calibration_wire import CalibrationStateJson
 from app.library import RecordingJson
 from app.player import SourceJson
+from app.profiles import Profile, ProfileEntryJson
 from app.recorder import RecorderJson
+from app.repeatability_wire import DeviationsJson, RepeatabilityJson
 from app.settings import Settings
+from app.studies import RunJson
 from app.wire import ClusterJson, CornerJson, FrameJson, LocalizationStateJson, SegmentJson
 
 TYPES = {
@@ -61,6 +67,24 @@ TYPES = {
     ("get", "/localization"): LocalizationStateJson,
     ("post", "/localization/reset"): LocalizationStateJson,
     ("put", "/localization/map"): LocalizationStateJson,
+    ("get", "/repeatability"): RepeatabilityJson,
+    ("delete", "/repeatability"): None,
+    ("get", "/repeatability/corners/{id}"): DeviationsJson,
+    ("get", "/studies"): StudiesJson,
+    ("post", "/studies/consistency"): RunJson,
+    ("post", "/studies/cwlf"): RunJson,
+    ("post", "/studies/wctls"): RunJson,
+    ("post", "/studies/clustering-ekf"): RunJson,
+    ("delete", "/studies/running"): None,
+    ("get", "/studies/reports/{name}"): None,
+    ("delete", "/studies/reports/{name}"): None,
+    ("get", "/calibration"): CalibrationStateJson,
+    ("post", "/calibration"): CalibrationStateJson,
+    ("delete", "/calibration"): None,
+    ("get", "/profiles"): ProfilesJson,
+    ("get", "/profiles/{name}"): Profile,
+    ("put", "/profiles/{name}"): ProfileEntryJson,
+    ("delete", "/profiles/{name}"): None,
     ("get", "/pose"): WhereJson,
     ("post", "/pose"): LocalizationStateJson,
     ("get", "/trajectory"): TrajectoryJson,
@@ -111,13 +135,17 @@ def test_every_answer_has_an_example_that_is_what_its_schema_says(document: Json
 
 
 # What the examples name and is not there: a sensor, a recording, a corner, a map.
-# Nothing is localized, and one recording at a time is recorded.
+# Nothing is localized, one recording at a time is recorded, and one study runs at a time.
 IN_VAIN = {
     ("/source", 404),
     ("/selection", 404),
     ("/recorder/start", 409),
     ("/localization/map", 404),
     ("/pose", 409),
+    ("/studies/consistency", 409),
+    ("/studies/cwlf", 409),
+    ("/studies/wctls", 409),
+    ("/studies/clustering-ekf", 409),
 }
 
 
@@ -176,8 +204,7 @@ def test_health_version_and_methods_say_what_is(server: Server) -> None:
     assert health["cpu_s"] > 0
     assert health["memory_bytes"] > 10e6
     with server.stream() as stream:
-        stream.frame()
-        assert server.get("/health")["clients"] == 1
+        stream.frame(lambda _: server.get("/health")["clients"] == 1)
     version = server.get("/version")
     assert version["viser"] == "1.1.1"
     methods = server.get("/methods")

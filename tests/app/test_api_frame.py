@@ -114,8 +114,8 @@ def test_while_the_kernels_compile_the_server_answers_and_says_so(
 def test_timings_and_rate_are_measured(server: Server) -> None:
     with server.stream() as stream:
         frame = [stream.frame() for _ in range(12)][-1]
+        stream.frame(lambda f: 9 < f["rate_hz"] < 11)  # once nothing else keeps the machine busy
     timings = frame["timings"]
     assert 0 < timings["per_method"]["ml"] <= timings["extract_us"]
     assert timings["draw_us"] > 0
     assert timings["age_ms"] * 1e3 >= timings["extract_us"]
-    assert 5 < frame["rate_hz"] < 15

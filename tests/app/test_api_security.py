@@ -28,6 +28,17 @@ MUTATIONS = [
     ("POST", "/map", {"format": "lidarcore landmarks"}),
     ("DELETE", "/landmarks", None),
     ("DELETE", "/sessions/1", None),
+    ("DELETE", "/repeatability", None),
+    ("POST", "/calibration", {}),
+    ("DELETE", "/calibration", None),
+    ("PUT", "/profiles/new.npz", {"extraction": {"noise": {"sigma_range": 0.01, "sigma_bearing": 0.001}}}),
+    ("DELETE", "/profiles/room.npz", None),
+    ("POST", "/studies/consistency", {}),
+    ("POST", "/studies/cwlf", {}),
+    ("POST", "/studies/wctls", {}),
+    ("POST", "/studies/clustering-ekf", {}),
+    ("DELETE", "/studies/running", None),
+    ("DELETE", "/studies/reports/cwlf_2026-11-21_10-00-00", None),
 ]
 WEBSOCKETS = [("/api/v1/stream", None), ("/viser", ["viser-v1.1.1"])]
 
@@ -51,7 +62,7 @@ def test_every_mutating_route_is_covered_by_these_tests(shared_server: Server) -
     paths = httpx.get(f"{shared_server.url}/openapi.json").json()["paths"]
     routes = {(m.upper(), path) for path, methods in paths.items() for m in methods if m != "get"}
     names = {f"/api/v1{path}": method for method, path, _ in MUTATIONS}
-    assert len(routes) == len(names) + 1  # PUT and PATCH of /source
+    assert len(routes) == len(names) + 2  # PUT and PATCH of /source, POST and DELETE of /calibration
     assert all(
         path.replace("{name}", "new.npz").replace("{id}", "1") in names or "{name}" in path
         for _, path in routes

@@ -11,7 +11,8 @@ from pathlib import Path
 import httpx
 import pytest
 import websockets
-from serving import ROOT, Server, strict_json, write_room
+from serving import ROOT, Json, Server, strict_json, write_room
+from waiting import PATIENCE
 
 from app.runtime import Slot
 from app.stream import Mailbox
@@ -117,7 +118,7 @@ def test_twenty_clients_get_every_frame_in_order_and_memory_does_not_grow(
     tmp_path: Path, free_port: Callable[[], int]
 ) -> None:
     """In a process of its own, whose memory is its own."""
-    room = write_room(tmp_path / "room.npz")
+    room = write_room(tmp_path / "room.npz", scans=100)
     port = free_port()
     command = [
         sys.executable,
@@ -144,28 +145,32 @@ async def twenty_clients(address: str) -> None:
         clients = [
             await websockets.connect(f"ws://{address}/api/v1/stream", max_size=None) for _ in range(20)
         ]
-        await frames(clients[0], 3)
+        await http.patch("/source", json={"state": "paused"})
+        for by in (1, -100):  # what was in the making has been shown then
+            at = (await http.post("/source/step", json={"by": by})).json()["index"]
+            for client in clients:
+                while (await frame(client))["source"]["index"] != at:
+                    pass
         memory = [(await http.get("/health")).json()]
-        for _ in range(2):
-            seen = [tasks.create_task(frames(client, 20)) for client in clients]
-            for sequences in [await task for task in seen]:
-                assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
+        for turn in range(2):
+            for at in range(20 * turn + 1, 20 * turn + 21):
+                await http.post("/source/step", json={"by": 1})
+                seen = [tasks.create_task(frame(client)) for client in clients]
+                assert [(await task)["source"]["index"] for task in seen] == 20 * [at]
             memory.append((await http.get("/health")).json())
         assert [m["clients"] for m in memory] == [20, 20, 20]
         grown = memory[2]["memory_bytes"] - memory[1]["memory_bytes"]
-        assert grown < 5e6, "2 s of frames queued for 20 clients would be 6 MB"
+        assert grown < 5e6, "20 frames queued for 20 clients would be 6 MB"
         for client in clients:
             await client.close()
 
 
-async def frames(client: websockets.ClientConnection, count: int) -> list[int]:
-    """Sequence numbers of the next frames."""
-    sequences: list[int] = []
-    while len(sequences) < count:
-        message = json.loads(await asyncio.wait_for(client.recv(), 60))
+async def frame(client: websockets.ClientConnection) -> Json:
+    """The next one."""
+    while True:
+        message: Json = json.loads(await asyncio.wait_for(client.recv(), PATIENCE))
         if message["type"] == "frame":
-            sequences.append(message["sequence"])
-    return sequences
+            return message
 
 
 def test_a_client_that_goes_is_forgotten(server: Server) -> None:

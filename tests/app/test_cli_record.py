@@ -25,6 +25,12 @@ def start(*arguments):
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
+def is_among(captured, scan):
+    """The one measured at the same time has as many beams."""
+    nearest = min(captured, key=lambda other: abs(other.stamp - scan.stamp))
+    return abs(nearest.stamp - scan.stamp) < 0.02 and len(nearest) == len(scan)
+
+
 def test_it_records_for_a_while_and_says_how_much(tmp_path):
     output, raw = tmp_path / "a.mcap", tmp_path / "a.rplidar"
     done = run(output, "--emulator", "--duration", 2, "--raw", raw, "--set", "gap=0.3")
@@ -34,14 +40,14 @@ def test_it_records_for_a_while_and_says_how_much(tmp_path):
     assert scans[-1].stamp - scans[0].stamp == pytest.approx(2, abs=0.5)
     assert abs(scans[-1].stamp - time.time()) < 60
     assert re.search(rf"a\.mcap: {len(scans)} scans in \d\.\d s, \d\.\d MB, \d+ kB/s$", done.stdout.strip())
-    captured = {round(scan.stamp, 2): len(scan) for scan in open_recording(raw)}
-    assert sum(captured.get(round(scan.stamp, 2)) == len(scan) for scan in scans) >= len(scans) - 2
+    captured = list(open_recording(raw))
+    assert sum(is_among(captured, scan) for scan in scans) >= len(scans) - 2
 
 
 def test_a_sensor_that_goes_away_is_told_of_at_the_end(tmp_path):
     output = tmp_path / "a.mcap"
     with EmulatorProcess() as emulator:
-        process = start(output, "--port", emulator.port, "--duration", 4)
+        process = start(output, "--port", emulator.port, "--duration", 6)
         deadline = time.monotonic() + 60
         while not (output.exists() and output.stat().st_size):
             assert time.monotonic() < deadline
@@ -64,7 +70,7 @@ def test_a_signal_ends_it_properly(tmp_path, number):
             assert process.poll() is None
             time.sleep(0.05)
         process.send_signal(number)
-        said, complaint = process.communicate(timeout=20)
+        said, complaint = process.communicate(timeout=60)
     assert (process.returncode, complaint) == (0, "")
     recording = open_recording(output)
     count = len(list(recording))
@@ -78,7 +84,7 @@ def test_a_signal_ends_waiting_for_an_answer_and_leaves_nothing(tmp_path):
     process = start(tmp_path / "a.mcap", "--port", os.ttyname(near))
     assert select.select([far], [], [], 60)[0]  # it asks
     process.terminate()
-    said, complaint = process.communicate(timeout=3)
+    said, complaint = process.communicate(timeout=60)
     assert (process.returncode, said) == (2, "")
     assert complaint == "lidarcore: Nothing was recorded: no scan came.\n"
     assert list(tmp_path.iterdir()) == []
@@ -95,10 +101,10 @@ def test_under_nohup_a_hangup_is_ignored(tmp_path):
             assert time.monotonic() < deadline
             time.sleep(0.05)
         process.send_signal(signal.SIGHUP)
-        said, _ = process.communicate(timeout=20)
+        said, _ = process.communicate(timeout=60)
     assert process.returncode == 0
     assert open_recording(output).notes == ()
-    assert re.search(r"\d+ scans in [12]\.\d s", said)
+    assert float(re.search(r"\d+ scans in (\d+\.\d) s", said)[1]) >= 1.5
 
 
 @pytest.mark.parametrize(

@@ -39,9 +39,8 @@ def refused(live: Server, status: int, body: Json) -> str:
     before = live.next_frame()
     detail: str = assert_problem(live.http.put("/source", json=body), status)["detail"]
     with live.stream() as stream:
-        after = stream.frame(lambda f: f["source"]["index"] > before["source"]["index"] + 1)
-        told = device(stream)
-    assert after["completeness"] == 1
+        stream.frame(lambda f: f["source"]["index"] > before["source"]["index"] + 1)
+        told = device(stream, lambda d: d["completeness"] == 1)
     assert (told["state"], told["reconnects"], told["overruns"]) == ("streaming", 0, 0)
     return detail
 

@@ -6,10 +6,11 @@ from functools import partial
 import numpy as np
 import pytest
 from pydantic import TypeAdapter
-from sensing import device, revolutions, settled, watch
+from sensing import device, revolutions, settled, unbroken, watch
 from serial.tools.list_ports import comports
 from serial.tools.list_ports_common import ListPortInfo
 from serving import Server, assert_problem, chosen
+from waiting import soonest
 
 import app.api.sensor
 import app.history
@@ -20,6 +21,7 @@ from app.wire import FrameJson
 from lidarcore.rplidar import find_devices
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
+AT_ONCE = 20  # ms: 2 or 3 on a machine at rest, and what waited for anything would take longer
 KNOWS = {
     "name": "RPLIDAR S1",
     "firmware": "1.28",
@@ -60,8 +62,7 @@ def test_a_sensor_plays_and_says_what_it_is(server: Server, sensor: EmulatorProc
 def test_frames_come_at_the_sensors_rate_numbered_and_stamped(watching: Server) -> None:
     with watching.stream() as stream:
         settled(stream)
-        frames = revolutions(stream, 15)
-    assert np.diff([f["source"]["index"] for f in frames]).tolist() == [1] * 14
+        frames = unbroken(stream, 15)
     assert np.diff([f["stamp"] for f in frames]) == pytest.approx(0.1, abs=0.01)
     assert np.diff([f["source"]["time"] for f in frames]) == pytest.approx(
         np.diff([f["stamp"] for f in frames])
@@ -73,19 +74,23 @@ def test_the_last_byte_of_a_revolution_is_sent_on_at_once(watching: Server) -> N
     watching.change("PATCH", "/settings", {"view": {"compare": True, "colour": "quality", "layers": layers}})
     with watching.stream() as stream:
         settled(stream)
-        timings = [f["timings"] for f in revolutions(stream, 30)]
-    for timing in timings:
-        assert timing["age_ms"] >= 1e-3 * (timing["extract_us"] + timing["draw_us"])
-    ages = [timing["age_ms"] for timing in timings]
-    assert min(statistics.median(ages[i : i + 10]) for i in (0, 10, 20)) <= 5  # other programs run here, too
+
+        def latency() -> float:
+            """Median over some revolutions, ms."""
+            timings = [f["timings"] for f in revolutions(stream, 10)]
+            for timing in timings:
+                assert timing["age_ms"] >= 1e-3 * (timing["extract_us"] + timing["draw_us"])
+            return statistics.median(timing["age_ms"] for timing in timings)
+
+        assert soonest(latency, 5) <= AT_ONCE
 
 
 def test_counters_are_told_at_least_once_a_second(watching: Server) -> None:
     with watching.stream() as stream:
         watching.change("PATCH", "/source", {"state": "paused"})
         stream.state(lambda s: s["source"]["state"] == "paused")
-        seen = [device(stream)["revolutions"] for _ in range(4)]
-    assert all(0 < more <= 12 for more in np.diff(seen)), seen
+        seen = [device(stream)["revolutions"] for _ in range(6)]
+    assert 0 < np.median(np.diff(seen)) <= 10, seen
 
 
 @pytest.mark.parametrize(("mode", "beams"), [("Standard", 1e6 / 244 / 10), ("DenseBoost", 1e6 / 108 / 10)])
@@ -122,20 +127,22 @@ def test_while_paused_kept_revolutions_are_stepped_through_and_playing_shows_the
     watching: Server,
 ) -> None:
     with watching.stream() as stream:
-        shown = {f["source"]["index"]: f for f in revolutions(stream, 6)}
-        watching.change("PATCH", "/source", {"state": "paused"})
-        paused = stream.state(lambda s: s["source"]["state"] == "paused")["source"]["index"]
-        for by in (-3, -1, 2):
+        unbroken(stream, 6)
+        paused = watching.change("PATCH", "/source", {"state": "paused"})["index"]
+        shown = {paused: stream.frame(lambda f: f["source"]["index"] == paused)}
+        device(stream, lambda d: d["revolutions"] > paused + 30)
+        for by in (-3, -1, 2, 1, 1):
             at = watching.change("POST", "/source/step", {"by": by})["index"]
             frame = stream.frame(lambda f, at=at: f["source"]["index"] == at)
-            if at in shown:
-                assert (frame["stamp"], frame["points"]) == (shown[at]["stamp"], shown[at]["points"])
-            assert frame["timings"]["age_ms"] < 1000  # of the wish to see it, not of the scan
-        assert at == paused - 2
-        device(stream, lambda d: d["revolutions"] > paused + 10)
+            known = shown.setdefault(at, frame)
+            assert (frame["stamp"], frame["points"]) == (known["stamp"], known["points"])
+            assert frame["timings"]["age_ms"] < 1500  # of the wish to see it, not of the scan
+        assert at == paused
+        assert sorted(shown) == [paused - 4, paused - 3, paused - 2, paused - 1, paused]
+        assert np.diff([shown[at]["stamp"] for at in sorted(shown)]) == pytest.approx(0.1, abs=0.01)
         watching.change("PATCH", "/source", {"state": "playing"})
         on = stream.frame(lambda f: f["source"]["index"] != at)
-    assert on["source"]["index"] >= paused + 9
+    assert on["source"]["index"] >= paused + 29
     assert watching.get("/source")["count"] is None
 
 
@@ -181,7 +188,8 @@ def test_the_ports_are_listed_with_who_is_there(
         (taken,) = server.get("/devices")
         assert (taken["in_use"], taken["name"]) == (True, None)
         assert "in use" in taken["error"]
-        assert [f["completeness"] for f in revolutions(stream, 3)] == [1, 1, 1]
+        told = device(stream, lambda d: d["completeness"] == 1)
+        assert (told["state"], told["reconnects"]) == ("streaming", 0)
 
 
 def test_without_being_told_the_connected_sensor_is_taken(

@@ -26,8 +26,8 @@ def test_of_a_recording_frames_are_counted_and_timed_and_no_sensor_is_spoken_of(
     server.next_frame()
     before = scrape(server)
     with server.stream() as stream:
-        stream.frame()
-        stream.frame(lambda f: f["sequence"] > before["lidarcore_frames_total"] + 3)
+        for _ in range(5):
+            stream.frame()
         after = scrape(server)
     for name in (
         "frames_total",
@@ -49,27 +49,31 @@ def test_the_sensors_counters_are_those_of_the_source_and_move(
     with server.stream() as stream:
         settled(stream)
         sensor.command("lose 0.05")
-        device(stream, lambda d: d["dropped"])
+        device(stream, lambda d: d["completeness"] < 1)
         sensor.command("lose 0")
-        told = device(stream, lambda d: d["completeness"] == 1)
+        device(stream, lambda d: d["completeness"] == 1)
+        earlier = server.get("/source")["device"]
         first = scrape(server)
+        later = server.get("/source")["device"]
         revolutions(stream, 3)
         second = scrape(server)
-    assert_tells(first, told, later=10)
+    assert_tells(first, earlier, later)
     for name in ("sensor_bytes_total", "sensor_revolutions_total", "frames_total", "latency_seconds_count"):
         assert second[f"lidarcore_{name}"] >= first[f"lidarcore_{name}"] + 2, name
     assert second["lidarcore_sensor_streaming"] == 1
-    assert second["lidarcore_sensor_completeness"] == 1
+    assert first["lidarcore_sensor_completeness"] == 1
     assert 9 < second["lidarcore_sensor_revolutions_per_second"] < 11
     assert second["lidarcore_sensor_reconnects_total"] == 0
 
 
-def assert_tells(samples: dict[str, float], told: Json, later: int) -> None:
-    """Counters are what was told, or a little more by so many revolutions later."""
-    assert 0 <= samples["lidarcore_sensor_revolutions_total"] - told["revolutions"] <= later
-    assert 0 <= samples["lidarcore_sensor_bytes_total"] - told["bytes"] <= later * 24 * 84
-    for reason, count in told["dropped"].items():
-        assert samples[f"lidarcore_sensor_dropped_total{{reason={reason}}}"] >= count > 0
+def assert_tells(samples: dict[str, float], earlier: Json, later: Json) -> None:
+    """Counters are between what was told before and after."""
+    for name in ("revolutions", "bytes"):
+        assert 0 < earlier[name] <= samples[f"lidarcore_sensor_{name}_total"] <= later[name]
+    assert earlier["dropped"]
+    for reason, count in earlier["dropped"].items():
+        told = samples[f"lidarcore_sensor_dropped_total{{reason={reason}}}"]
+        assert 0 < count <= told <= later["dropped"][reason]
 
 
 def test_recording_and_interruption_show(server: Server, sensor: EmulatorProcess) -> None:
@@ -95,12 +99,12 @@ def test_what_is_looked_at_again_is_not_late(server: Server, sensor: EmulatorPro
     with server.stream() as stream:
         shown = revolutions(stream, 5)[-1]["source"]["index"]
         server.change("PATCH", "/source", {"state": "paused", "index": shown - 3})
-        device(stream, lambda d: d["revolutions"] > shown + 8)
+        device(stream, lambda d: d["revolutions"] > shown + 30)
         before = scrape(server)
         for by in (-1, 1, -1):
             at = server.change("POST", "/source/step", {"by": by})["index"]
             stream.frame(lambda f, at=at: f["source"]["index"] == at)
         after = scrape(server)
-    late = "lidarcore_latency_seconds_bucket{le=+Inf}", "lidarcore_latency_seconds_bucket{le=0.1}"
-    assert after[late[0]] - before[late[0]] >= 3
-    assert after[late[0]] - after[late[1]] == before[late[0]] - before[late[1]]
+    count, total = "lidarcore_latency_seconds_count", "lidarcore_latency_seconds_sum"
+    assert after[count] - before[count] >= 3
+    assert after[total] - before[total] < 3  # the three scans are as many seconds old, each

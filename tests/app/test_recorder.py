@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from waiting import PATIENCE, wait_until
 
 from app.recorder import AsyncRecorder, RecorderBusyError
 from app.spooler import Spooler
@@ -25,13 +26,6 @@ def recorder():
 def scans():
     sensor, rng = SimulatedSensor(furnished_room()), np.random.default_rng(0)
     return [sensor.scan(np.array([4.5, 4.0, 0.0]), rng, 1e9 + 0.1 * k)[0] for k in range(12)]
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 def test_scans_are_recorded_from_start_to_stop(recorder, tmp_path, scans):
@@ -130,7 +124,7 @@ def test_many_threads_may_use_it_at_once(recorder, tmp_path, scans):
     for thread in busy:
         thread.start()
     for thread in busy:
-        thread.join(20)
+        thread.join(PATIENCE)
     status = recorder.stop()
     assert status["state"] == "idle"
     assert len(list(open_recording(tmp_path / "a.mcap"))) == status["scans"]
@@ -149,7 +143,7 @@ class SlowDisk:
         return spooler
 
     def write(self, item):
-        assert self.free.wait(20)
+        assert self.free.wait(PATIENCE)
         if item == "bad":
             raise RecordingError("This one is bad.")
         self.taken.append(item)
@@ -161,7 +155,7 @@ def test_a_slow_disk_costs_what_does_not_fit_and_never_the_callers_time():
     begin = time.perf_counter()
     for item in range(1000):
         spooler.put(item)
-    assert time.perf_counter() - begin < 1  # the disk stands still all the while
+    assert time.perf_counter() - begin < PATIENCE / 2  # the disk stands still all the while
     assert 989 <= spooler.dropped <= 990  # one may be in the writer's hand
     disk.free.set()
     spooler.end()
@@ -173,9 +167,9 @@ def test_a_slow_disk_costs_what_does_not_fit_and_never_the_callers_time():
 def test_a_spooler_has_a_chance_to_flush_while_nothing_comes():
     disk = SlowDisk()
     spooler = disk.spooler(10)
-    assert disk.idle.wait(20)
+    assert disk.idle.wait(PATIENCE)
     spooler.end()
-    assert disk.closed.wait(20)
+    assert disk.closed.wait(PATIENCE)
 
 
 def test_a_spooler_that_fails_says_why_and_closes():
@@ -184,7 +178,7 @@ def test_a_spooler_that_fails_says_why_and_closes():
     spooler = disk.spooler(10)
     for item in ("good", "bad", "never"):
         spooler.put(item)
-    assert disk.closed.wait(20)
+    assert disk.closed.wait(PATIENCE)
     spooler.join()
     assert disk.taken == ["good"]
     assert disk.errors == ["This one is bad."]

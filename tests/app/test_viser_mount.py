@@ -13,7 +13,8 @@ import psutil
 import pytest
 import viser
 import zstandard
-from serving import CORNERS, Json, Server
+from serving import CORNERS, Json, Server, wait_until
+from waiting import PATIENCE
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
@@ -32,7 +33,7 @@ class Viewer:
 
     def read(self) -> list[Json]:
         """The next window of messages, taken into account."""
-        messages = decode(self.websocket.recv(timeout=20))
+        messages = decode(self.websocket.recv(timeout=PATIENCE))
         for message in messages:
             self.types.add(message["type"])
             name = message.get("name")
@@ -123,17 +124,21 @@ def test_layers_theme_and_selection_reach_the_scene(server: Server, room) -> Non
         viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
         assert not viewer.nodes["/body/selection"]["visible"]
         server.change("PUT", "/selection", {"corner": frame["corners"][0]["id"]})
-        viewer.until(lambda: viewer.nodes["/body/selection"]["visible"])
-        ring = viewer.array("/body/selection", "points").reshape(-1, 3)[:, :2].mean(axis=0)
         corner = frame["corners"][0]["by_method"]["ml"]
-        np.testing.assert_allclose(ring, [corner["x"], corner["y"]], atol=0.01)
+
+        def is_ringed() -> bool:
+            ring = viewer.array("/body/selection", "points").reshape(-1, 3)[:, :2]
+            around = len(ring) > 0 and np.allclose(ring.mean(axis=0), [corner["x"], corner["y"]], atol=0.01)
+            return viewer.nodes["/body/selection"]["visible"] and around
+
+        viewer.until(is_ringed)
         server.change(
             "PATCH", "/settings", {"view": {"layers": {"points": False, "grid": False}, "theme": "light"}}
         )
         viewer.until(
             lambda: not (viewer.nodes["/body/points"]["visible"] or viewer.nodes["/grid"]["visible"])
         )
-        assert "ThemeConfigurationMessage" in viewer.types
+        viewer.until(lambda: "ThemeConfigurationMessage" in viewer.types)
 
 
 def test_a_localized_sensor_and_what_it_sees_are_drawn_where_it_is(server: Server, room) -> None:
@@ -147,12 +152,18 @@ def test_a_localized_sensor_and_what_it_sees_are_drawn_where_it_is(server: Serve
     with viewing(server) as viewer:
         viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
         server.change("POST", "/source/step", {"by": 1})
-        viewer.until(lambda: viewer.array("/body/sensor", "points").reshape(-1, 3)[:, 0].min() > 8)
+        wait_until(lambda: server.get("/frame")["source"]["index"] == 1)
         x, y = np.array(server.get("/frame", points=True)["points"]).T
         pose = server.get("/pose")
         assert (pose["x"], pose["y"], pose["heading"]) == pytest.approx((10, -5, np.pi / 2), abs=0.02)
-        shown = viewer.array("/body/points", "points").reshape(-1, 3)[:, :2]
-        np.testing.assert_allclose(shown, np.stack([10 - y, -5 + x], -1), atol=0.15)
+
+        def are_where_it_is() -> bool:
+            shown = viewer.array("/body/points", "points").reshape(-1, 3)[:, :2]
+            wanted = np.stack([10 - y, -5 + x], -1)
+            return shown.shape == wanted.shape and np.allclose(shown, wanted, rtol=0, atol=0.15)
+
+        viewer.until(lambda: viewer.array("/body/sensor", "points").reshape(-1, 3)[:, 0].min() > 8)
+        viewer.until(are_where_it_is)
 
 
 def test_a_click_selects_the_nearest_corner(server: Server, room) -> None:
@@ -222,7 +233,7 @@ def test_a_broken_message_ends_only_the_client_that_sent_it(server: Server) -> N
 def test_a_client_of_another_version_is_told_so(server: Server, protocols: list | None) -> None:
     with connect(f"ws://127.0.0.1:{server.port}/viser", subprotocols=protocols) as websocket:
         with pytest.raises(ConnectionClosed) as closed:
-            websocket.recv(timeout=10)
+            websocket.recv(timeout=PATIENCE)
         assert closed.value.rcvd.code == 1002
 
 

@@ -5,12 +5,11 @@ import io
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import httpx
@@ -19,6 +18,7 @@ import psutil
 from numpy.typing import NDArray
 from PIL import Image
 from playwright.sync_api import Page, expect
+from waiting import PATIENCE, free_port, wait_until
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"
@@ -30,32 +30,26 @@ FLAGS = [
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
 ]  # fmt: skip
 WASM_BINDING = "unsafe-eval"  # viser's client tries once at its start, is refused, and does without
-expect.set_options(timeout=15_000)
+expect.set_options(timeout=1e3 * PATIENCE)
 Pixels = NDArray[np.int64]
-
-
-def wait_until(holds: Callable[[], object], what: str, seconds: float = 20) -> None:
-    """Wait for a condition; fail saying what did not come true."""
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, f"not within {seconds} s: {what}"
-        time.sleep(0.05)
 
 
 class Server:
     """`lidarcore serve` on a port that stays its own when it is killed and started again."""
 
     def __init__(self, folder: Path) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            self.port = probe.getsockname()[1]
+        self.port = free_port()
         self.folder, self.url = folder, f"http://127.0.0.1:{self.port}"
-        self.api = httpx.Client(base_url=f"{self.url}/api/v1/", timeout=30)
+        self.api = httpx.Client(base_url=f"{self.url}/api/v1/", timeout=PATIENCE)
 
     def start(self) -> None:
+        self.launch()
+        wait_until(self._is_ready, "the server is ready", 120)
+
+    def launch(self) -> None:
+        """Start it, and do not wait for it."""
         command = [sys.executable, "-m", "app.cli", "serve", "--http-port", str(self.port), "--emulator"]
         self._process = subprocess.Popen([*command, "--recordings", str(self.folder)], cwd=ROOT)
-        wait_until(self._is_ready, "the server is ready", 120)
 
     def _is_ready(self) -> bool:
         assert self._process.poll() is None, f"the server ended with {self._process.returncode}"
@@ -90,9 +84,13 @@ class Server:
         wait_until(lambda: self.get("frame")["source"].items() >= position.items(), f"scan {index} is shown")
 
     def pause(self) -> dict:
-        """The frame that stays: what was in the making when the source stopped has been shown."""
-        index = self.patch("source", {"state": "paused"})["index"]
-        wait_until(lambda: self.get("frame")["source"]["index"] >= index, f"scan {index} is shown")
+        """The frame that stays. One scan back and forward again: what was in the making before has been shown then."""
+        self.patch("source", {"state": "paused"})
+        for by in (-1, 1):
+            index = self.api.post("source/step", json={"by": by}).raise_for_status().json()["index"]
+            wait_until(
+                lambda index=index: self.get("frame")["source"]["index"] == index, f"scan {index} is shown"
+            )
         return self.get("frame")
 
     def disturb(self, *commands: str) -> None:
@@ -103,7 +101,8 @@ class Server:
         """As after its start: the emulator plays, settings are the defaults, the folder is empty."""
         self.api.post("recorder/stop")
         self.api.put("selection", json={"corner": None, "landmark": None}).raise_for_status()
-        self.patch("settings", {"extraction": None, "clusters": None, "navigation": None, "view": None})
+        groups = ("extraction", "clusters", "navigation", "view", "repeatability")
+        self.patch("settings", dict.fromkeys(groups))
         self.emulate()
         for recording in self.get("recordings")["recordings"]:
             if not recording["builtin"]:
@@ -135,9 +134,43 @@ class Visitor:
         page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
 
     def open(self, hash: str = "") -> "Visitor":
+        """Go there; the page has a frame, all its controls, and has done what the link asks for."""
         self.page.goto(f"{self.server.url}/{hash}")
-        expect(self.page.locator("#readout-frame")).to_have_text(re.compile(r"^\d+$"), timeout=30_000)
+        expect(self.page.locator("#readout-frame")).to_have_text(re.compile(r"^\d+$"))
+        expect(self.page.locator("#setting-extraction-min_points")).to_have_value(re.compile(r"^\d+$"))
+        if not hash:  # it writes its own once it is done
+            wait_until(lambda: self.page.evaluate("location.hash"), "the address says what is shown")
         return self
+
+    def knows(self, key: str) -> Any:
+        """What the page itself knows of "settings", "source", "selection", "recorder", "frame", ..."""
+        return self.page.evaluate("key => import('/static/js/store.js').then(({ get }) => get(key))", key)
+
+    def catch_up(self) -> "Visitor":
+        """Wait until the page knows what the server knows."""
+        server = self.server
+        wait_until(lambda: self.knows("settings") == server.get("settings"), "the page has the settings")
+        wait_until(lambda: self.knows("selection") == server.get("selection"), "the page has the selection")
+        wait_until(
+            lambda: self.knows("recorder")["state"] == server.get("recorder")["state"],
+            "the page has the recorder",
+        )
+        names = ("kind", "recording", "state", "speed", "loop")
+        wait_until(
+            lambda: (
+                [self.knows("source")[name] for name in names]
+                == [server.get("source")[name] for name in names]
+            ),
+            "the page has the source",
+        )
+        return self
+
+    def await_frame(self, frame: dict) -> dict:
+        """Wait until the page shows this frame, which stays."""
+        wait_until(
+            lambda: self.readout("frame") == str(frame["sequence"]), "the page shows the frame that stays"
+        )
+        return frame
 
     def readout(self, name: str) -> str:
         return self.page.inner_text(f"#readout-{name}")

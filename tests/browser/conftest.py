@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from browsing import CHROMIUM, FLAGS, Server, Visitor
 from playwright.sync_api import Browser, sync_playwright
+from waiting import PATIENCE
 
 
 @pytest.fixture(scope="session")
@@ -41,7 +42,7 @@ def visit(browser: Browser, server: Server) -> Iterator[Callable[..., Visitor]]:
         context = browser.new_context(
             viewport={"width": width, "height": height}, color_scheme=theme, **options
         )
-        context.set_default_timeout(20_000)
+        context.set_default_timeout(1e3 * PATIENCE)
         visitors.append(Visitor(context.new_page(), at))
         return visitors[-1]
 

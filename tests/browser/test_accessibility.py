@@ -3,11 +3,12 @@
 from collections.abc import Callable
 
 import pytest
-from browsing import Visitor, wait_until
+from browsing import Visitor
 from playwright.sync_api import expect
+from waiting import wait_until
 
-PANELS = ("Corners", "Setup", "Map", "Plots", "Source", "Rejected")
-MAPPED = {"view": {"compare": True}, "navigation": {"mode": "slam"}}
+PANELS = ("Corners", "Setup", "Map", "Plots", "Repeatability", "Source", "Rejected")
+MAPPED = {"view": {"compare": True}, "navigation": {"mode": "slam"}, "repeatability": {"running": True}}
 CONTROLS = {
     "button", "checkbox", "combobox", "link", "radio", "slider", "spinbutton", "switch", "tab", "Iframe",
 }  # fmt: skip
@@ -64,6 +65,7 @@ def contrast(a: list[float], b: list[float]) -> float:
 
 def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     phone.server.patch("settings", MAPPED)
+    expect(phone.page.locator("#corner-table thead .group")).to_have_count(6)
     for panel in PANELS:
         phone.page.get_by_role("tab", name=panel).click()
         assert phone.page.evaluate("document.documentElement.scrollWidth") <= 390
@@ -80,21 +82,22 @@ def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
 def test_narrow_page_plays_and_selects(phone: Visitor) -> None:
     phone.page.get_by_role("button", name="Pause").tap()
     wait_until(lambda: phone.server.get("source")["state"] == "paused", "it is paused")
+    phone.await_frame(phone.server.pause())
     phone.page.locator("#corner-table tbody tr").nth(1).tap()
     wait_until(lambda: phone.server.get("selection")["corner"], "a corner is selected")
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], theme: str) -> None:
-    visitor = visit(1400, 900, theme=theme).open()
+    visitor = visit(1400, 900, theme=theme, reduced_motion="reduce").open()  # else colours would fade in
     wait_until(lambda: visitor.server.get("settings")["view"]["theme"] == theme, "the preference is taken")
     expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)
     visitor.server.patch("settings", MAPPED)
-    visitor.server.pause()  # the corner that is selected stays
+    visitor.await_frame(visitor.server.pause())  # the corner that is selected stays
     visitor.page.keyboard.press("ArrowDown")
+    expect(visitor.page.locator("#corner-table tr.selected")).to_have_count(1)
     for panel in PANELS[1:]:
         visitor.page.get_by_role("tab", name=panel).click()
-        visitor.page.wait_for_timeout(200)  # colours fade in for 120 ms
         texts = visitor.page.evaluate(TEXT_COLOURS)
         assert len(texts) > 40
         weak = [(text, round(contrast(a, b), 2)) for text, a, b in texts if contrast(a, b) < 4.5]
@@ -134,6 +137,8 @@ def test_page_has_landmarks_and_a_table_that_can_be_read_out(visitor: Visitor) -
         expect(page.get_by_role("region", name=name)).to_have_count(1)
     assert page.locator("#toasts").get_attribute("aria-live") == "polite"
     assert "Corners of the current frame" in page.locator("#corner-table caption").text_content()
+    for part in ("thead th[scope]", "tbody th[scope=row]"):
+        expect(page.locator(f"#corner-table {part}").first).to_be_visible()
     assert page.locator("#corner-table thead th:not([scope])").count() == 0
     assert page.locator("#corner-table tbody th:not([scope=row])").count() == 0
     assert page.locator("#scene").get_attribute("title")

@@ -2,8 +2,10 @@
 
 import re
 
-from browsing import Server, Visitor, drawn, wait_until
+import pytest
+from browsing import HOKUYO, Server, Visitor, drawn
 from playwright.sync_api import expect
+from waiting import wait_until
 
 PARAMETERS = {
     "Gaps": ["distance"],
@@ -34,7 +36,7 @@ def test_method_is_switched_live_and_shows_only_what_it_uses(visitor: Visitor) -
         wait_until(
             lambda title=title: server.get("settings")["clusters"]["method"] == methods[title]["name"], title
         )
-        assert shown_parameters(visitor) == {*own, *OF_ALL}
+        wait_until(lambda own=own: shown_parameters(visitor) == {*own, *OF_ALL}, f"the parameters of {title}")
         expect(page.locator("#cluster-cost")).to_have_text(
             re.compile(r"^\d+ in this scan, found in [\d.]+.(µs|ms)\.$")
         )
@@ -44,20 +46,21 @@ def test_number_of_clusters_is_chosen_by_the_page_or_for_every_scan(visitor: Vis
     server, page = visitor.server, visitor.page
     server.patch("settings", {"clusters": {"method": "kmeans"}, "view": {"layers": {"clusters": True}}})
     number = page.get_by_role("spinbutton", name="Number, k")
-    assert number.get_attribute("placeholder") == "auto"
+    expect(number).to_have_attribute("placeholder", "auto")
     number.fill("4")
     page.keyboard.press("Enter")
     wait_until(lambda: found(server) == 4, "there are four clusters")
-    assert "k_max" not in shown_parameters(visitor)
+    wait_until(lambda: "k_max" not in shown_parameters(visitor), "there is nothing to choose")
     number.fill("")
     page.keyboard.press("Enter")
     wait_until(lambda: server.get("settings")["clusters"]["k"] is None, "k is chosen for every scan")
-    assert "k_max" in shown_parameters(visitor)
+    wait_until(lambda: "k_max" in shown_parameters(visitor), "there is something to choose")
 
 
+@pytest.mark.real_data
 def test_clusters_are_drawn_where_they_are_shown(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
-    server.pause()
+    server.show(HOKUYO, 60)
     server.patch("settings", {"view": {"layers": {"segments": False, "corners": False, "ellipses": False}}})
     visitor.fit()
     before = visitor.still_picture()

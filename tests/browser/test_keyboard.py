@@ -3,8 +3,9 @@
 from collections.abc import Callable, Iterator
 
 import pytest
-from browsing import Server, Visitor, wait_until
+from browsing import Server, Visitor
 from playwright.sync_api import Browser, expect
+from waiting import wait_until
 
 
 def view(server: Server) -> dict:
@@ -42,8 +43,7 @@ def test_key_does_what_the_help_says(keys: Visitor, key: str, holds: Callable[[S
 
 
 def test_arrow_selects_a_corner(keys: Visitor) -> None:
-    keys.page.keyboard.press(" ")
-    expect(keys.page.get_by_role("button", name="Back to live")).to_be_visible()
+    keys.await_frame(keys.server.pause())
     keys.page.keyboard.press("ArrowDown")
     wait_until(lambda: keys.server.get("selection")["corner"], "a corner is selected")
 
@@ -60,10 +60,8 @@ def keys_page(browser: Browser, running: Server) -> Iterator[Visitor]:
 
 @pytest.fixture
 def keys(keys_page: Visitor) -> Visitor:
-    server = keys_page.server
-    server.reset()
-    expect(keys_page.page.get_by_role("button", name="Pause")).to_be_visible()
-    return keys_page
+    keys_page.server.reset()
+    return keys_page.catch_up()
 
 
 def test_question_mark_opens_the_help(keys: Visitor) -> None:
@@ -73,13 +71,15 @@ def test_question_mark_opens_the_help(keys: Visitor) -> None:
     keys.page.keyboard.press("c")
     keys.page.keyboard.press("Escape")
     expect(dialog).to_be_hidden()
+    keys.page.keyboard.press("g")
+    wait_until(lambda: not view(keys.server)["layers"]["grid"], "once it is closed, keys work again")
     assert not view(keys.server)["compare"], "keys do nothing behind a dialog"
 
 
 def test_keys_pressed_in_the_scene_work_too(keys: Visitor) -> None:
     box = keys.page.locator("#scene").bounding_box()
     keys.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + 30)
-    assert keys.page.evaluate("document.activeElement.id") == "scene"
+    wait_until(lambda: keys.page.evaluate("document.activeElement.id") == "scene", "the scene has the focus")
     keys.page.keyboard.press("c")
     wait_until(lambda: view(keys.server)["compare"], "the page got the key")
 
@@ -87,7 +87,7 @@ def test_keys_pressed_in_the_scene_work_too(keys: Visitor) -> None:
 def test_space_plays_on_after_a_click_on_step(keys: Visitor) -> None:
     keys.page.get_by_role("button", name="One scan back").click()
     wait_until(lambda: keys.server.get("source")["state"] == "paused", "it is paused")
-    keys.page.keyboard.press(" ")
+    keys.catch_up().page.keyboard.press(" ")
     wait_until(lambda: keys.server.get("source")["state"] == "playing", "it plays")
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import GOLF, Server, Visitor, wait_until
+from browsing import GOLF, Server, Visitor
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from playwright.sync_api import Browser, WebSocket, expect
+from waiting import wait_until
 
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
@@ -34,14 +35,14 @@ class Watched:
         if message["type"] == "frame":
             self.frames.append(message)
 
-    def wait_for(self, holds: Callable[[Frame], object], what: str) -> Frame:
-        """The first frame from now on of which this holds."""
-        seen = len(self.frames)
+    def wait_for(self, holds: Callable[[Frame], object], what: str, since: int | None = None) -> Frame:
+        """The first frame from now on, or after so many, of which this holds."""
+        seen = len(self.frames) if since is None else since
 
         def found() -> bool:
             self.page.wait_for_timeout(
                 20
-            )  # the browser's events are only handled while it is asked something
+            )  # events of the browser are only handled while it is asked something
             return any(holds(frame) for frame in self.frames[seen:])
 
         wait_until(found, what)
@@ -139,8 +140,11 @@ def test_device_unplugged_and_plugged_in_again_under_the_page(live: Watched) -> 
         live.expect_cut_off()
         lidar.command("replug")
         live.expect_streaming()
-        expect(live.page.locator("#device-reconnects")).to_have_text("1")
+        reconnects = live.server.get("source")["device"]["reconnects"]
+        assert reconnects >= 1  # a machine that is held up for seconds takes a sensor for lost
+        expect(live.page.locator("#device-reconnects")).to_have_text(str(reconnects))
         live.press("Emulator")
+        expect(live.page.locator("#readout-source")).to_have_text("Emulated S1")
         live.expect_streaming()
 
 
@@ -214,19 +218,24 @@ def test_speed_changed_in_the_page_is_the_lidars(live: Watched) -> None:
 
 
 def test_live_view_is_frozen_stepped_back_and_live_again(live: Watched) -> None:
-    live.wait_for(lambda frame: frame["source"]["index"] > 5, "some scans are kept")
+    began = len(live.frames)
+    live.wait_for(lambda _: len(live.frames) >= began + 8, "some scans are shown")
     live.press("Pause")
     expect(live.page.locator("#live")).to_have_text("Paused")
     wait_until(lambda: live.server.get("source")["state"] == "paused", "it is paused")
-    shown = {frame["source"]["index"]: frame["stamp"] for frame in live.frames}
-    index = live.server.get("source")["index"]
-    for back in (1, 2, 3):
+    shown = {frame["source"]["index"]: frame["stamp"] for frame in live.frames[began:]}
+    last = live.server.pause()
+    index, again = last["source"]["index"], {}
+    while len(shown.keys() & again.keys()) < 3:  # a page that is busy is not shown every scan
+        since, at = len(live.frames), index - len(again) - 1
         live.page.keyboard.press("ArrowLeft")
-        live.wait_for(lambda frame, back=back: frame["source"]["index"] == index - back, "an earlier scan")
-    assert live.frames[-1]["stamp"] == shown[index - 3], "the scan shown before is shown again"
+        again[at] = live.wait_for(
+            lambda frame, at=at: frame["source"]["index"] == at, "an earlier one", since
+        )
+    assert {at: again[at]["stamp"] for at in again if at in shown}.items() <= shown.items()
     live.press("Back to live")
     newest = live.wait_for(lambda frame: frame["source"]["index"] > index, "newer scans")
-    assert newest["stamp"] > shown[index]
+    assert newest["stamp"] > last["stamp"]
     live.expect_streaming()
 
 
@@ -242,11 +251,14 @@ def test_link_to_a_live_view_shows_what_is_live_now(live: Watched, visit: Callab
 def test_what_is_recorded_is_what_the_page_showed(live: Watched) -> None:
     page, server = live.page, live.server
     page.get_by_text("Raw", exact=True).click()
+    began = len(live.frames)
     live.press("Record")
     expect(page.locator("#recorder-status")).to_have_text(re.compile(r"0:0\d\.\d · .*B\n?raw · .*B/s"))
+    live.wait_for(lambda _: len(live.frames) >= began + 15, "some scans are shown", began)
     wait_until(lambda: server.get("recorder")["scans"] >= 15, "some scans are recorded")
     live.page.keyboard.press("w")
     expect(page.locator(".toast")).to_contain_text("Recorded")
+    page.get_by_role("button", name="Play it").focus()  # a message that has the focus stays
     recorder = server.get("recorder")
     assert (recorder["state"], recorder["dropped"], recorder["error"]) == ("idle", 0, None)
     path = server.folder / recorder["name"]

@@ -1,7 +1,9 @@
 """The page lives: it loads from this machine alone, draws, and follows the frames."""
 
-from browsing import Visitor, drawn, wait_until
+import numpy as np
+from browsing import Visitor, drawn
 from playwright.sync_api import expect
+from waiting import wait_until
 
 
 def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
@@ -14,11 +16,13 @@ def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
 
 
 def test_scene_shows_the_room(visitor: Visitor) -> None:
-    wait_until(lambda: drawn(visitor.picture()).mean() > 0.01, "something is drawn")
-    rows, columns = drawn(visitor.picture()).nonzero()
-    height, width, _ = visitor.picture().shape
-    assert rows.max() - rows.min() > height / 2, "the room fills the scene"
-    assert columns.max() - columns.min() > width / 3
+    def fills_the_scene() -> bool:
+        picture = drawn(visitor.picture())
+        rows, columns = picture.nonzero()
+        height, width = picture.shape
+        return picture.mean() > 0.01 and np.ptp(rows) > height / 2 and np.ptp(columns) > width / 3
+
+    wait_until(fills_the_scene, "the room fills the scene")
 
 
 def test_frames_advance_in_figures_and_picture(visitor: Visitor) -> None:
@@ -28,12 +32,7 @@ def test_frames_advance_in_figures_and_picture(visitor: Visitor) -> None:
 
 
 def test_figures_are_those_of_the_frame(visitor: Visitor) -> None:
-    server, page = visitor.server, visitor.page
-    server.pause()
-    wait_until(
-        lambda: visitor.readout("frame") == str(server.get("frame")["sequence"]), "the last frame is shown"
-    )
-    frame = server.get("frame")
+    page, frame = visitor.page, visitor.await_frame(visitor.server.pause())
     assert visitor.readout("corners") == str(len(frame["corners"]))
     assert visitor.readout("segments") == str(len(frame["segments"][frame["fitter"]]))
     assert page.locator("#corner-table tbody tr").count() == len(frame["corners"])
@@ -44,7 +43,7 @@ def test_plots_follow_the_frames(visitor: Visitor) -> None:
     page.get_by_role("tab", name="Plots").click()
     expect(page.locator("#plots figure")).to_have_count(3)
     inked = "canvas => canvas.getContext('2d').getImageData(0, 0, 300, 200).data.some(value => value > 0)"
-    assert page.locator("#plots canvas").first.evaluate(inked)
+    wait_until(lambda: page.locator("#plots canvas").first.evaluate(inked), "the first one is drawn")
     shown = page.locator("#plots figure").nth(2).locator("output").first
     before = shown.inner_text()
     wait_until(lambda: shown.inner_text() != before, "the median area is updated")

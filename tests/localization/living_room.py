@@ -63,8 +63,8 @@ def navigate(
 ) -> Iterator[tuple[Scan, Whereabouts]]:
     """Step through the scans, changed if need be."""
     for k, scan in enumerate(scans):
-        changed = change(k, scan)
-        yield changed, navigator.step(changed, extract(navigator.deskewed(changed), EXTRACTION))
+        changed = navigator.deskewed(change(k, scan))
+        yield changed, navigator.step(changed, extract(changed, EXTRACTION))
 
 
 def pose_error(where: Whereabouts, truth: Array) -> Array:

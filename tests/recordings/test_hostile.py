@@ -187,10 +187,10 @@ def test_hostile_files_are_refused_fast_and_in_little_memory(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(make())
     assert path.stat().st_size < 2 * MEBIBYTE
-    before, begin = peak_memory(reset=True), time.perf_counter()
+    before, begin = peak_memory(reset=True), time.process_time()
     with pytest.raises(RecordingError, match=text):
         list(open_recording(path))
-    assert time.perf_counter() - begin < 5
+    assert time.process_time() - begin < 10
     assert peak_memory() - before < 100 * MEBIBYTE
 
 

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from serial import Serial
+from waiting import PATIENCE as PATIENCE
 
 from lidarcore.rplidar import Driver, State
 from lidarcore.rplidar.protocol import Command, request
 
-PATIENCE = 15.0  # s, for what has no limit of its own on a busy machine
 MOTOR_STOPS = bytes.fromhex("a525 a5a80200000f")  # STOP, and speed 0, as the protocol has them
 
 

@@ -6,8 +6,10 @@ from contextlib import contextmanager
 
 import numpy as np
 import serial
+from waiting import PATIENCE
 
 ASK_INFO, ASK_HEALTH = "a550", "a552"
+ASK_SAMPLERATE, SAMPLERATE = "a559", "a55a0400000015f4006c00"
 STOP, RESET, SCAN, FORCE_SCAN = "a525", "a540", "a520", "a521"
 DENSE_BOOST = "a582050100000000" + "23"
 DENSE_BOOST_OF_OLD_SDKS = "a582050000000000" + "22"
@@ -16,7 +18,7 @@ DENSE, LEGACY = "a55a5400004085", "a55a0500004081"
 
 class Line:
     def __init__(self, port, baud=256000):
-        self.serial = serial.Serial(port, baud, timeout=5, exclusive=True)
+        self.serial = serial.Serial(port, baud, timeout=PATIENCE, exclusive=True)
 
     def send(self, request: str) -> None:
         self.serial.write(bytes.fromhex(request))
@@ -32,7 +34,7 @@ class Line:
 
     def ask_until_answered(self, request: str, count: int) -> str:
         """Of a sensor that is still deaf."""
-        until = time.monotonic() + 10
+        until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
             self.send(request)
             if first := self.read_within(0.2):
@@ -53,12 +55,30 @@ class Line:
         assert self.ask(request, 7) == descriptor
 
     def drain(self) -> None:
-        """Stop whatever scans, until nothing comes any more."""
+        """Stop whatever scans, and read all that was under way: what is asked after it is answered last."""
         self.send(STOP)
-        until = time.monotonic() + 5
-        while not self.is_silent(0.05):
-            self.serial.reset_input_buffer()
-            assert time.monotonic() < until
+        self.until_silent(0.05)  # so that the line has room for an answer
+        self.send(ASK_SAMPLERATE)
+        heard = b""
+        while not heard.endswith(bytes.fromhex(SAMPLERATE)):
+            heard += self.read(1)
+
+    def until_silent(self, seconds: float) -> bytes:
+        """All that comes before it is quiet for so long: a sensor that is busy finishes later what it was asked."""
+        heard, until = b"", time.monotonic() + PATIENCE
+        while byte := self.read_within(seconds):
+            assert time.monotonic() < until, "it goes on"
+            heard += byte
+        return heard
+
+    def until_whole(self, n: int, within: int = 600) -> None:
+        """Read capsules until so many in a row are whole: what was sent before may still be on its way."""
+        run = 0
+        for _ in range(within):
+            run = run + 1 if self.capsules(1)[0][0] else 0
+            if run == n:
+                return
+        raise AssertionError("capsules stay broken")
 
     def capsules(self, n: int):
         return capsules(self.read(84 * n))

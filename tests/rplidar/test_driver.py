@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from driving import PATIENCE, Program, Watched, leave_streaming
 from serial import Serial
+from waiting import soonest, wait_until
 
 from lidarcore.errors import DeviceError, NoAnswerError, NoDeviceError, PortBusyError
 from lidarcore.rplidar import Driver
@@ -55,13 +56,13 @@ def test_it_tells_what_is_connected_and_gives_whole_turns(sensor: EmulatorProces
 
 
 def test_the_first_scan_is_there_within_a_second(sensor: EmulatorProcess) -> None:
-    durations = []
-    for _ in range(5):
+    def duration() -> float:
         start = time.monotonic()
         with Driver(sensor.port) as driver:
             next(iter(driver))
-            durations.append(time.monotonic() - start)
-    assert statistics.median(durations) <= 1.0
+            return time.monotonic() - start
+
+    assert soonest(duration, 1.0) <= 1.0
 
 
 def test_the_mode_can_be_chosen(sensor: EmulatorProcess) -> None:
@@ -91,10 +92,10 @@ def test_what_nobody_takes_is_dropped_the_oldest_first(sensor: EmulatorProcess) 
         while driver.statistics.overruns < 5 and time.monotonic() < enough:
             time.sleep(0.01)
         told = driver.statistics
-        kept = [revolution.arrival for revolution in islice(driver.revolutions(), 10)]
+        kept = [revolution.times[0] for revolution in islice(driver.revolutions(), 10)]
     assert told.overruns >= 5
-    assert told.revolutions == told.overruns + 10
-    assert max(np.diff(kept)) < 0.2, "they do not follow each other"
+    assert told.revolutions - told.overruns in (10, 11)  # one may be on its way
+    assert max(np.diff(kept)) < 0.1, "they do not follow each other"
 
 
 def test_the_tap_sees_every_byte(sensor: EmulatorProcess) -> None:
@@ -105,6 +106,7 @@ def test_the_tap_sees_every_byte(sensor: EmulatorProcess) -> None:
     heard = [data for direction, _, data in seen if direction == "in"]
     descriptor = next(i for i, data in enumerate(heard) if data.startswith(bytes.fromhex("a55a5400004085")))
     decoded = [turn for data in heard[descriptor + 1 :] for turn in decoder.feed(data, 0.0)]
+    assert len(decoded) >= len(taken) == 5
     for ours, theirs in zip(taken, decoded, strict=False):
         np.testing.assert_array_equal(ours.angles, theirs.angles)
         np.testing.assert_array_equal(ours.distances, theirs.distances)
@@ -134,7 +136,7 @@ def test_what_the_tap_raises_reaches_the_caller_and_the_sensor_is_stopped(sensor
     with pytest.raises(OSError, match="No space left"), Driver(sensor.port, tap=tap) as driver:
         list(driver)
     with Serial(sensor.port, 256_000, timeout=0.2) as line:
-        assert line.read(1) == b""
+        wait_until(lambda: line.read(200) == b"", "it is silent")
 
 
 @pytest.mark.parametrize(
@@ -186,8 +188,9 @@ def test_a_sensor_left_streaming_is_taken_over_a_hundred_times_of_a_hundred() ->
             for attempt in range(first, first + 25):
                 leave_streaming(sensor.port, 91 + attempt)  # anywhere within a capsule
                 with Watched(sensor.port) as driver:
-                    driver.wait_for("streaming", within=2)
+                    driver.wait_for("streaming")
                     assert driver.mode == DENSE_BOOST
+                    assert driver.statistics.reconnects == 0
         return 25
 
     with ThreadPoolExecutor() as pool:

@@ -20,7 +20,7 @@ def test_silence_is_told_in_bounded_time() -> None:
     start = time.monotonic()
     with pytest.raises(NoAnswerError, match=r"Nothing answers.*power"):
         Driver(os.ttyname(ends[1])).__enter__()
-    assert time.monotonic() - start < 10
+    assert time.monotonic() - start < PATIENCE / 2
     for end in ends:
         os.close(end)
 
@@ -42,7 +42,7 @@ def test_closing_ends_connecting_to_silence(stops: int) -> None:
     closer.start()
     with pytest.raises(DeviceError, match="was closed"):
         driver.__enter__()
-    assert time.monotonic() - closed[0] < 0.5
+    assert time.monotonic() - closed[0] < 5  # by itself it ends after as long
     closer.join()
     for end in (far, near):
         os.close(end)
@@ -55,7 +55,7 @@ def test_a_signal_ends_connecting_to_silence_without_a_word(tmp_path: Path) -> N
         start = time.monotonic()
         program.terminate()
         assert program.communicate(timeout=PATIENCE) == ("", "")
-    assert time.monotonic() - start < 2
+    assert time.monotonic() - start < PATIENCE / 2
     assert program.returncode == 128 + signal.SIGTERM
     assert program.stopped_the_motor()
     for end in (far, near):

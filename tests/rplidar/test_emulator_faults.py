@@ -8,6 +8,7 @@ import psutil
 import pytest
 import serial
 from emulated_line import ASK_HEALTH, ASK_INFO, LEGACY, SCAN, capsules, line_to, nodes, steps
+from waiting import PATIENCE
 
 from lidarcore import DeviceError
 from lidarcore.rplidar.emulation.faults import Faults
@@ -31,37 +32,50 @@ def line(emulator):
         yield line
 
 
+def lateness(line, size, count, period):
+    """By how much each of so many packets comes later than at that pace (s), but for a constant."""
+    at = []
+    for _ in range(count):
+        line.read(size)
+        at.append(time.monotonic())
+    return np.array(at) - np.arange(count) * period
+
+
+def pace(late, period):
+    """Time from one to the next (s), by those at either end that are held up least: a busy machine makes late only."""
+    tenth = len(late) // 10
+    first, last = np.argmin(late[:tenth]), np.argmin(late[-tenth:]) + len(late) - tenth
+    return period + (late[last] - late[first]) / (last - first)
+
+
 def test_capsules_come_at_the_pace_of_an_s1_and_cost_little(emulator, line):
     line.scan()
     line.capsules(20)
     process = psutil.Process(emulator.pid)
-    used, at = process.cpu_times(), []
-    for _ in range(450):
-        line.capsules(1)
-        at.append(time.monotonic())
+    used = process.cpu_times()
+    late = lateness(line, 84, 450, CAPSULE)
     now = process.cpu_times()
-    late = at - np.arange(450) * CAPSULE  # of each, but for a constant
-    assert at[-1] - at[0] == pytest.approx(449 * CAPSULE, rel=0.01)
-    assert np.median(late) - late.min() < 0.002  # most are where they belong, to half a capsule
-    assert now.user + now.system - used.user - used.system < 0.05 * (at[-1] - at[0])
+    assert pace(late, CAPSULE) == pytest.approx(CAPSULE, rel=0.01)
+    assert (
+        np.quantile(late, 0.1) - late.min() < 0.02
+    )  # they do not come in the blocks of 0.1 s that are simulated
+    assert now.user + now.system - used.user - used.system < 0.2 * 450 * CAPSULE
 
 
 def test_legacy_nodes_come_at_the_pace_of_an_s1(line):
     line.scan(SCAN, LEGACY)
     line.read(5 * 160)
-    begin = time.monotonic()
-    line.read(5 * 4000)
-    assert time.monotonic() - begin == pytest.approx(4000 * 244e-6, rel=0.03)
+    period = 16 * 244e-6  # as many are sent at once
+    assert pace(lateness(line, 5 * 16, 400, period), period) == pytest.approx(period, rel=0.02)
 
 
 def test_flipped_bits_break_that_share_of_the_capsules(emulator, line):
     emulator.command("flip 0.3")
     line.scan()
     whole = line.capsules(300)[0]
-    assert 0.2 < 1 - whole.mean() < 0.4  # six standard deviations of 300 draws are 0.16
+    assert 0.14 < 1 - whole.mean() < 0.46  # six standard deviations of 300 draws
     emulator.command("flip 0")
-    line.capsules(60)
-    assert line.capsules(60)[0].all()
+    line.until_whole(60)
 
 
 def test_lost_capsules_leave_twice_the_angle(emulator, line):
@@ -118,17 +132,17 @@ def test_garbage_comes_between_whole_capsules(emulator, line):
 def test_a_stall_is_a_silence_in_which_the_head_turns_on(emulator, line):
     line.scan()
     line.capsules(50)
-    emulator.command("stall 0.6")
     begin = time.monotonic()
-    line.serial.timeout = 0.2
-    before = line.serial.read(84 * 100)
-    assert len(before) < 84 * 50
-    assert line.is_silent(0.2)
-    line.serial.timeout = 5
-    whole, flags, _, _ = line.capsules(20)
-    assert whole.all()
-    assert not flags.any()  # the scan goes on, it does not begin again
-    assert time.monotonic() - begin >= 0.6
+    emulator.command("stall 1.5")
+    at, whole, flags = [], [], []
+    while not at or at[-1] < begin + 1.6:
+        is_whole, flag, *_ = line.capsules(1)
+        at.append(time.monotonic())
+        whole += is_whole.tolist()
+        flags += flag.tolist()
+    assert max(np.diff([begin, *at])) > 0.75
+    assert all(whole)
+    assert not any(flags)  # the scan goes on, it does not begin again
 
 
 def test_a_client_that_does_not_read_stops_nothing(emulator, line):
@@ -142,7 +156,7 @@ def test_a_client_that_does_not_read_stops_nothing(emulator, line):
     while data := line.serial.read(1 << 16):
         backlog += len(data)
     assert 84 * 100 < backlog < 84 * 300  # 347 capsules in 1.5 s
-    line.serial.timeout = 5
+    line.serial.timeout = PATIENCE
     line.drain()
     assert line.ask(ASK_HEALTH, 10) == "a55a0300000006" "000000"  # fmt: skip
 
@@ -174,8 +188,8 @@ def test_replugged_it_answers_at_the_same_path_as_just_switched_on(emulator, lin
 
 def test_plugged_in_again_it_may_have_to_boot():
     with EmulatorProcess(boot=0.5) as emulator:
-        emulator.command("replug")
         begin = time.monotonic()
+        emulator.command("replug")
         with line_to(emulator) as line:
             line.ask_until_answered(ASK_INFO, 27)
         assert time.monotonic() - begin > 0.4
@@ -188,7 +202,8 @@ def test_faults_combine(emulator, line):
     emulator.command("garbage 5000")
     data = line.read(84 * 200)
     whole = [capsules(data[at : at + 84])[0][0] for at in range(len(data) - 84)]
-    assert 60 < sum(whole) < 140  # of 140 that are no garbage, 0.9 * 0.998 to the power of 84 = 0.76
+    # Of 140 that are no garbage, 0.9 * 0.998 to the power of 84 = 0.76; of up to 200 where there is no room for it.
+    assert 60 < sum(whole) < 180
     emulator.command("health 2 3")
     line.drain()
     assert line.ask(ASK_HEALTH, 10) == "a55a0300000006" "020300"  # fmt: skip

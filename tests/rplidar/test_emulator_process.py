@@ -11,6 +11,7 @@ import psutil
 import pytest
 from emulated_line import ASK_INFO, line_to
 from pydantic import ValidationError
+from waiting import PATIENCE
 
 from lidarcore import DeviceError
 from lidarcore.rplidar.emulation.options import EmulatorOptions, parse
@@ -54,7 +55,7 @@ def test_killed_it_leaves_no_port_no_folder_and_no_zombie(tmp_path, options):
     ended = threading.Event()
     with EmulatorProcess(on_end=ended.set, **link) as emulator:
         os.kill(emulator.pid, signal.SIGKILL)
-        assert ended.wait(10)
+        assert ended.wait(PATIENCE)
         assert not os.path.lexists(emulator.port)
         assert Path(emulator.port).parent.exists() == bool(options)
         assert not psutil.pid_exists(emulator.pid)
@@ -72,7 +73,7 @@ def test_its_end_is_told_once_and_only_if_it_was_not_asked_for():
 
     with EmulatorProcess(on_end=end) as emulator:
         emulator.command("quit")
-        assert ended.wait(10)
+        assert ended.wait(PATIENCE)
     assert ends == [emulator.port]
     with EmulatorProcess(on_end=lambda: ends.append("closed")):
         pass
@@ -130,7 +131,7 @@ def test_it_ends_when_its_parent_is_killed():
     emulator = psutil.Process(int(pid))
     parent.kill()
     parent.communicate()
-    emulator.wait(10)
+    emulator.wait(PATIENCE)
     assert not Path(port).parent.exists()
 
 
@@ -139,7 +140,7 @@ def test_a_signal_ends_it_and_leaves_nothing_behind(end):
     process, port = start([], stdin=subprocess.PIPE)
     process.send_signal(end)
     with process:
-        assert process.wait(10) == 0
+        assert process.wait(PATIENCE) == 0
     assert not Path(port).parent.exists()
 
 
@@ -158,5 +159,5 @@ def test_it_obeys_lines_in_pieces_and_quits_when_told():
         for piece in ("unp", "lug\nreplug\nqu", "it\n"):
             process.stdin.write(piece)
             process.stdin.flush()
-        assert process.wait(10) == 0
+        assert process.wait(PATIENCE) == 0
         assert process.stdout.read() == "ok unplug\nok replug\nok quit\n"

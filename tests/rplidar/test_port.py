@@ -146,7 +146,7 @@ def test_draining_ends_when_it_is_quiet_and_when_it_never_is(line: Line) -> None
 
     talker = threading.Thread(target=talk)
     talker.start()
-    quiet = port.drain(limit=0.2)
+    quiet = all(port.drain(limit=0.2) for _ in range(50))  # a busy machine may hold up who talks
     talking.set()
     talker.join()
     port.close()
