@@ -8,10 +8,11 @@ import numpy as np
 
 from lidarcore.compiled import kernel
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.merge import merge, refine_ends, surest_corner
+from lidarcore.segmentation.ends import place_ends
+from lidarcore.segmentation.merge import merge, surest_corner
 from lidarcore.segmentation.ring import compact, find_breaks, mean_increment, noise_seen, unroll
 from lidarcore.segmentation.split import split_runs
-from lidarcore.segmentation.sums import SUMS, residuals, sums
+from lidarcore.segmentation.sums import SUMS, residuals, sums_of
 
 __all__ = ["compact", "find_pieces", "mean_increment", "noise_seen"]
 
@@ -49,13 +50,12 @@ def find_pieces(
             points, starts[: n_runs + 1], threshold, v_rho, v_theta, scratch, stack, first, last, run
         )
         m = np.empty((count + 1, SUMS))
+        sums_of(points, first, last, m, count)
         for p in range(count):
-            inside = slice(first[p], last[p] + 1)
-            sums(points[0, inside], points[1, inside], points[2, inside], m[p])
             m[p, 9], variance = residuals(m[p], v_rho, v_theta)
             m[p, 8] = m[p, 9] / variance
         count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])
-        refine_ends(points, first, last, run, m, count)
+        place_ends(points, first, last, run, m, count, v_rho, v_theta)
         if not closed or count < 2:
             return first[:count], last[:count]
         # Noise moves the farthest point along its wall: once more from where two walls surely meet.
