@@ -55,7 +55,7 @@ def find_pieces(
             m[p, 9], variance = residuals(m[p], v_rho, v_theta)
             m[p, 8] = m[p, 9] / variance
         count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])
-        place_ends(points, first, last, run, m, count, v_rho, v_theta)
+        place_ends(points, first, last, run, m, count, increment, v_rho, v_theta)
         if not closed or count < 2:
             return first[:count], last[:count]
         # Noise moves the farthest point along its wall: once more from where two walls surely meet.
