@@ -12,7 +12,7 @@ from lidarcore.segmentation.ends import place_ends
 from lidarcore.segmentation.merge import merge, surest_corner
 from lidarcore.segmentation.ring import compact, find_breaks, mean_increment, noise_seen, unroll
 from lidarcore.segmentation.split import split_runs
-from lidarcore.segmentation.sums import SUMS, residuals, sums_of
+from lidarcore.segmentation.sums import SUMS, residuals, sums
 
 __all__ = ["compact", "find_pieces", "mean_increment", "noise_seen"]
 
@@ -50,8 +50,9 @@ def find_pieces(
             points, starts[: n_runs + 1], threshold, v_rho, v_theta, scratch, stack, first, last, run
         )
         m = np.empty((count + 1, SUMS))
-        sums_of(points, first, last, m, count)
         for p in range(count):
+            inside = slice(first[p], last[p] + 1)
+            sums(points[0, inside], points[1, inside], points[2, inside], m[p])
             m[p, 9], variance = residuals(m[p], v_rho, v_theta)
             m[p, 8] = m[p, 9] / variance
         count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])

@@ -6,6 +6,7 @@ from lidarcore.compiled import inlined
 from lidarcore.scan import Array, Ints
 
 SUMS = 10  # number, means of x and y, S_xx, S_xy, S_yy, means of c² and c s, chi-square, sum of squares
+_TRIM_FROM = 4  # intervals between points: three are left
 
 
 @inlined
@@ -31,10 +32,14 @@ def sums(rho: Array, c: Array, s: Array, out: Array) -> None:
 
 
 @inlined
-def sums_of(points: Array, first: Ints, last: Ints, m: Array, count: int) -> None:
-    """Sums of each of `count` pieces, into the first columns of m."""
+def inner_sums(points: Array, first: Ints, last: Ints, m: Array, count: int) -> None:
+    """Sums of each of `count` pieces into the first columns of m, without the end points of all but the shortest.
+
+    They are what a piece was split at: extremes, and often of two walls.
+    """
     for p in range(count):
-        inside = slice(first[p], last[p] + 1)
+        trim = 1 if last[p] - first[p] >= _TRIM_FROM else 0
+        inside = slice(first[p] + trim, last[p] + 1 - trim)
         sums(points[0, inside], points[1, inside], points[2, inside], m[p])
 
 
