@@ -6,7 +6,7 @@ and beams of the neighbour bend the line; the bearing at which the lines meet do
 
 from lidarcore.compiled import inlined
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.sums import inner_sums, line_of
+from lidarcore.segmentation.sums import line_of, sums_of
 
 _PASSES = 2  # the lines follow their ends: the first pass takes out most of what is the neighbour's
 _REACH, _REACH_ANGLE = 12, 0.08  # points, and rad, looked at on each side of a common end: whichever is more
@@ -22,12 +22,12 @@ def place_ends(
 ) -> None:  # fmt: skip
     """Move each common end of two neighbours in one run to where their lines meet, or to the likeliest step.
 
-    first, last (count,) are changed in place; m (count, SUMS) then has sums of the inner points.
+    first, last (count,) are changed in place; so are the sums m (count, SUMS).
     increment is the angle between beams, rad.
     """
     reach = max(_REACH, int(_REACH_ANGLE / increment))
-    for _ in range(_PASSES):
-        inner_sums(points, first, last, m, count)
+    for again in range(_PASSES):
+        sums_of(points, first, last, m, count, trimmed=again == 0)
         for i in range(count - 1):
             if run[i] == run[i + 1]:
                 last[i] = _common_end(

@@ -32,13 +32,11 @@ def sums(rho: Array, c: Array, s: Array, out: Array) -> None:
 
 
 @inlined
-def inner_sums(points: Array, first: Ints, last: Ints, m: Array, count: int) -> None:
-    """Sums of each of `count` pieces into the first columns of m, without the end points of all but the shortest.
-
-    They are what a piece was split at: extremes, and often of two walls.
-    """
+def sums_of(points: Array, first: Ints, last: Ints, m: Array, count: int, trimmed: bool) -> None:
+    """Sums of each of `count` pieces into the first columns of m; trimmed, without the end points of all but the
+    shortest: where a piece was split they are extremes, and often of two walls."""
     for p in range(count):
-        trim = 1 if last[p] - first[p] >= _TRIM_FROM else 0
+        trim = 1 if trimmed and last[p] - first[p] >= _TRIM_FROM else 0
         inside = slice(first[p] + trim, last[p] + 1 - trim)
         sums(points[0, inside], points[1, inside], points[2, inside], m[p])
 
