@@ -8,7 +8,8 @@ import numpy as np
 
 from lidarcore.compiled import kernel
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.merge import merge, refine_ends, surest_corner
+from lidarcore.segmentation.ends import place_ends
+from lidarcore.segmentation.merge import merge, surest_corner
 from lidarcore.segmentation.ring import compact, find_breaks, mean_increment, noise_seen, unroll
 from lidarcore.segmentation.split import split_runs
 from lidarcore.segmentation.sums import SUMS, residuals, sums
@@ -55,7 +56,7 @@ def find_pieces(
             m[p, 9], variance = residuals(m[p], v_rho, v_theta)
             m[p, 8] = m[p, 9] / variance
         count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])
-        refine_ends(points, first, last, run, m, count)
+        place_ends(points, first, last, run, m, count, increment, v_rho, v_theta)
         if not closed or count < 2:
             return first[:count], last[:count]
         # Noise moves the farthest point along its wall: once more from where two walls surely meet.

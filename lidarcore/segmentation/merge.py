@@ -1,15 +1,14 @@
-"""Neighbouring pieces: merged where one line explains both, else their common end put where it belongs."""
+"""Neighbouring pieces: merged where one line explains both."""
 
 import numpy as np
 
 from lidarcore.compiled import inlined, kernel
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.sums import join, line_of, residuals
+from lidarcore.segmentation.sums import join, residuals
 
 _MERGE_CHI2 = (
     25.0  # far out for the two or three parameters saved: splits are chosen at extremes, not at random
 )
-_REFINE_REACH = 12  # points looked at on each side of a common end
 
 
 @kernel
@@ -88,29 +87,6 @@ def _cheapest(cost: Array, count: int) -> int:
         if cost[i] < cost[best]:
             best = i
     return best
-
-
-@inlined
-def refine_ends(points: Array, first: Ints, last: Ints, run: Ints, m: Array, count: int) -> None:
-    """Move each common end of two neighbours in one run to where their lines explain the points best."""
-    rho, c, s = points[0], points[1], points[2]
-    for i in range(count - 1):
-        if run[i] != run[i + 1]:
-            continue
-        ax, ay, ar, _ = line_of(m[i])
-        bx, by, br, _ = line_of(m[i + 1])
-        low = max(first[i] + 1, last[i] - _REFINE_REACH)
-        high = min(last[i + 1] - 1, last[i] + _REFINE_REACH)
-        cost = least = 0.0
-        best = low - 1
-        for k in range(low, high):
-            cost += (rho[k] * (ax * c[k] + ay * s[k]) - ar) ** 2 - (
-                rho[k] * (bx * c[k] + by * s[k]) - br
-            ) ** 2
-            if cost < least:
-                best, least = k, cost
-        last[i] = best
-        first[i + 1] = best + 1
 
 
 @inlined

@@ -3,9 +3,10 @@
 import numpy as np
 
 from lidarcore.compiled import inlined
-from lidarcore.scan import Array
+from lidarcore.scan import Array, Ints
 
 SUMS = 10  # number, means of x and y, S_xx, S_xy, S_yy, means of c² and c s, chi-square, sum of squares
+_TRIM_FROM = 4  # intervals between points: three are left
 
 
 @inlined
@@ -28,6 +29,16 @@ def sums(rho: Array, c: Array, s: Array, out: Array) -> None:
     out[0], out[1], out[2] = n, x + x0, y + y0
     out[3], out[4], out[5] = xx / n - x * x, xy / n - x * y, yy / n - y * y
     out[6], out[7] = cc / n, cs / n
+
+
+@inlined
+def sums_of(points: Array, first: Ints, last: Ints, m: Array, count: int, trimmed: bool) -> None:
+    """Sums of each of `count` pieces into the first columns of m; trimmed, without the end points of all but the
+    shortest: where a piece was split they are extremes, and often of two walls."""
+    for p in range(count):
+        trim = 1 if trimmed and last[p] - first[p] >= _TRIM_FROM else 0
+        inside = slice(first[p] + trim, last[p] + 1 - trim)
+        sums(points[0, inside], points[1, inside], points[2, inside], m[p])
 
 
 @inlined
