@@ -119,16 +119,14 @@ def _segment(
     indices: Ints,
 ) -> tuple[Ints, Ints, float]:
     """Beams to points, points to pieces: first and last point of each, and the noise seen in the ranges."""
-    v_rho, v_theta, threshold, gap, enough = parameters[:5]
+    v_rho, v_theta, threshold, gap = parameters[:4]
     unit_vectors(bearings, points[1], points[2])
     n = compact(ranges, points, beams)
     # Told too little noise, walls would fall apart: pieces are made for the noise seen, if that is larger.
     seen = noise_seen(points[0, :n], scratch)
     v_rho = max(v_rho, seen * seen)
     increment = mean_increment(bearings)
-    first, last = find_pieces(
-        points, beams, n, v_rho, v_theta, threshold, gap, increment, int(enough), scratch, indices
-    )
+    first, last = find_pieces(points, beams, n, v_rho, v_theta, threshold, gap, increment, scratch, indices)
     return first, last, seen
 
 

@@ -48,7 +48,7 @@ class ExtractionSettings:
     ] = 0.3
     min_points: Annotated[
         int, Field(ge=2, le=1000, description="a segment needs at least this many points")
-    ] = 7
+    ] = 6
     min_length: Annotated[float, number(0.0, 10.0, "m", "a segment must be at least this long")] = 0.2
     corner_angle: Annotated[
         float,

@@ -27,7 +27,6 @@ def find_pieces(
     threshold: float,
     gap: float,
     increment: float,
-    enough: int,
     scratch: Array,
     indices: Ints,
 ) -> tuple[Ints, Ints]:
@@ -35,7 +34,6 @@ def find_pieces(
 
     points (3, 2 n) and beams (2 n,) hold n points and room to unroll the ring, so that it starts at a break and the
     result does not depend on where the scan starts. increment is the mean angle between beams, rad;
-    a piece that has `enough` points keeps as many when ends are placed;
     scratch (2 n,) and indices (6, 2 n) are scratch that the result is a part of.
     """
     starts, first, last, run, stack = indices[0], indices[1], indices[2], indices[3], indices[4]
@@ -58,7 +56,7 @@ def find_pieces(
             m[p, 9], variance = residuals(m[p], v_rho, v_theta)
             m[p, 8] = m[p, 9] / variance
         count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])
-        place_ends(points, first, last, run, m, count, increment, enough, v_rho, v_theta)
+        place_ends(points, first, last, run, m, count, increment, v_rho, v_theta)
         if not closed or count < 2:
             return first[:count], last[:count]
         # Noise moves the farthest point along its wall: once more from where two walls surely meet.

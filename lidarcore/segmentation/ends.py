@@ -18,13 +18,12 @@ _STEP_CHI2 = (
 @inlined
 def place_ends(
     points: Array, first: Ints, last: Ints, run: Ints, m: Array, count: int,
-    increment: float, enough: int, v_rho: float, v_theta: float,
+    increment: float, v_rho: float, v_theta: float,
 ) -> None:  # fmt: skip
     """Move each common end of two neighbours in one run to where their lines meet, or to the likeliest step.
 
     first, last (count,) are changed in place; so are the sums m (count, SUMS).
-    increment is the angle between beams, rad. A piece of `enough` points keeps as many: else the noise would lose half
-    the walls that are just so long.
+    increment is the angle between beams, rad.
     """
     reach = max(_REACH, int(_REACH_ANGLE / increment))
     for again in range(_PASSES):
@@ -32,7 +31,7 @@ def place_ends(
         for i in range(count - 1):
             if run[i] == run[i + 1]:
                 last[i] = _common_end(
-                    points, first[i], last[i], last[i + 1], m[i], m[i + 1], reach, enough, v_rho, v_theta
+                    points, first[i], last[i], last[i + 1], m[i], m[i + 1], reach, v_rho, v_theta
                 )
                 first[i + 1] = last[i] + 1
 
@@ -40,7 +39,7 @@ def place_ends(
 @inlined
 def _common_end(
     points: Array, first: int, end: int, last: int, a: Array, b: Array,
-    reach: int, enough: int, v_rho: float, v_theta: float,
+    reach: int, v_rho: float, v_theta: float,
 ) -> int:  # fmt: skip
     """The last point of the first of two pieces (first ... end, end + 1 ... last) with sums a and b.
 
@@ -56,7 +55,6 @@ def _common_end(
     w_a = _weight(rho[end], c[end], s[end], ax, ay, v_rho, v_theta)
     w_b = _weight(rho[end], c[end], s[end], bx, by, v_rho, v_theta)
     low, high = max(first + 1, end - reach), min(last - 1, end + reach)
-    low, high = max(low, min(first + enough - 1, end)), min(high, max(last - enough + 1, end + 1))
     likeliest = meeting = low - 1
     cost = least = cost_meeting = 0.0
     for k in range(low, high):
