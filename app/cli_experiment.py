@@ -1,6 +1,5 @@
 """The command `lidarcore experiment`: experiments of papers, run again, and a report of each."""
 
-import errno
 import os
 from dataclasses import replace
 from itertools import islice
@@ -9,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli_options import Topic, end_like_ctrl_c
+from app.cli_options import Topic, check_folder, end_like_ctrl_c
 from app.cli_progress import ForPrograms, counted
 
 if TYPE_CHECKING:
     from lidarcore import Scan
-    from lidarcore.experiments.cwlf_claims import Claim
+    from lidarcore.experiments.claim_rules import Claim
     from lidarcore.experiments.environments import Design
 
 QUICK_RUNS = 2
@@ -44,7 +43,8 @@ Scans = Annotated[
     int | None, typer.Option(min=10, help="scans of each room, 2000 if not given; or of the recording, all")
 ]
 SigmaRange = Annotated[
-    float | None, typer.Option(help="m, the methods are told; the papers' 0.05 if not given")
+    float | None,
+    typer.Option(help="m, the methods are told; the papers' 0.05 if not given: calibrate a real sensor"),
 ]
 SigmaBearing = Annotated[float | None, typer.Option(help="rad, likewise; 0.0035 (0.2°) if not given")]
 
@@ -63,7 +63,7 @@ def cwlf(
     for_programs: ForPrograms = False,
 ) -> None:
     """Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time."""
-    _check(output)
+    check_folder(output)
     from lidarcore import files
     from lidarcore.experiments import cwlf as paper
     from lidarcore.experiments.cwlf_claims import claims
@@ -71,6 +71,7 @@ def cwlf(
     from lidarcore.experiments.environments import Design
 
     design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
+    _tell_assumption(design, recording)
     with counted(1 if recording else paper.PARTS, for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
     files.write(output, html(result))
@@ -91,7 +92,7 @@ def wctls(
     for_programs: ForPrograms = False,
 ) -> None:
     """Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty."""
-    _check(output)
+    check_folder(output)
     from lidarcore import files
     from lidarcore.experiments import wctls as paper
     from lidarcore.experiments.environments import Design
@@ -100,6 +101,7 @@ def wctls(
 
     whole = Design(seed=seed, split_threshold=paper.THRESHOLD)
     design = _design(whole, scans, sigma_range, sigma_bearing, quick)
+    _tell_assumption(design, recording)
     with counted(1 if recording else paper.PARTS, for_programs) as done:
         result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
     files.write(output, html(result))
@@ -118,7 +120,7 @@ def clustering_ekf(
     for_programs: ForPrograms = False,
 ) -> None:
     """Four ways to cluster lidar points, with and without a Kalman filter, on three trajectories."""
-    _check(output)
+    check_folder(output)
     from lidarcore import files
     from lidarcore.experiments import clustering_ekf as paper
     from lidarcore.experiments.clustering_ekf_report import html
@@ -132,24 +134,10 @@ def clustering_ekf(
     typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
 
 
-def _check(output: Path) -> None:
-    """Told before minutes of work are lost."""
-    if output.is_dir() or not output.absolute().parent.is_dir():
-        raise FileNotFoundError(
-            errno.ENOENT, "is no file in a folder that exists, give one for --output", str(output)
-        )
-
-
 def _design(
     design: "Design", scans: int | None, sigma_range: float | None, sigma_bearing: float | None, quick: bool
 ) -> "Design":
-    from lidarcore import SensorNoise
-
-    noise = SensorNoise(
-        design.noise.sigma_range if sigma_range is None else sigma_range,
-        design.noise.sigma_bearing if sigma_bearing is None else sigma_bearing,
-    )
-    design = replace(design, noise=noise)
+    design = design.with_noise(sigma_range, sigma_bearing)
     if quick:
         design = design.quick()
     return design if scans is None else replace(design, scans=scans)
@@ -161,6 +149,15 @@ def _read(recording: Path | None, topic: str | None, scans: int | None) -> "list
     return None if recording is None else list(islice(open_recording(recording, topic), scans))
 
 
+def _tell_assumption(design: "Design", recording: Path | None) -> None:
+    if recording is not None and design.assumption:
+        typer.echo(design.assumption)
+
+
 def _tell(output: Path, claims: "list[Claim]") -> None:
-    differ = sum(agrees is False for *_, agrees in claims)
-    typer.echo(f"{output}: {len(claims)} claims of the paper, {differ} of them differ from what was measured")
+    from lidarcore.experiments.report import NOT_COMPARABLE
+
+    verdicts = [verdict for *_, verdict in claims]
+    words = {"agree": True, "differ": False, "open": None, NOT_COMPARABLE: NOT_COMPARABLE}
+    told = ", ".join(f"{word} {verdicts.count(verdict)}" for word, verdict in words.items())
+    typer.echo(f"{output}: {len(claims)} claims of the paper: {told}")

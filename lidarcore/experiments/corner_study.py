@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency_design import KINDS
@@ -78,10 +79,16 @@ class CornerStudy:
         return int((areas < _areas(self.bounds)).sum())
 
     def scan_areas(self, fitter: str, kind: Covariance) -> Array:
-        """(K,) m², the median of each scan's one-sigma ellipses; scans without corners are left out."""
+        """(K,) m², the median of each scan's one-sigma ellipses, of scans in which every fitter found a corner."""
         areas = _areas(self.trials[fitter, kind].covariances)
-        medians: Array = np.nanmedian(areas[:, np.isfinite(areas).any(0)], axis=0)
+        medians: Array = np.nanmedian(areas[:, self._with_corners], axis=0)
         return medians
+
+    @cached_property
+    def _with_corners(self) -> NDArray[np.bool_]:
+        found = [np.isfinite(trials.errors[..., 0]).any(0) for trials in self.trials.values()]
+        every: NDArray[np.bool_] = np.all(found, axis=0)
+        return every
 
     def scattered(self, fitter: str) -> Array:
         """(P, 2, 2) m², mean square errors: what a true covariance would be."""
@@ -119,6 +126,23 @@ class CornerStudy:
         both = np.isfinite(e[..., 0] + f[..., 0])[..., None]
         return ratio(*((np.where(both, x, 0.0) ** 2).sum((0, 2)) for x in (e, f))).root()
 
+    def claimed_ratios(self, fitter: str, other: str) -> tuple[Interval, Interval]:
+        """Mean published standard deviations of x and of y by one fitter over those by another, all scans together."""
+        one, two = (
+            np.sqrt(np.diagonal(self.trials[name, "published"].covariances, axis1=2, axis2=3))
+            for name in (fitter, other)
+        )
+        both = np.isfinite(one + two)
+        sums = [np.where(both, sigmas, 0.0).sum(0) for sigmas in (one, two)]
+        return ratio(sums[0][:, 0], sums[1][:, 0]), ratio(sums[0][:, 1], sums[1][:, 1])
+
+    def apart(self, fitter: str, other: str) -> Interval:
+        """RMS distance between the corners of two fitters in the same scans, over the RMS error by the other."""
+        one, two = (self.trials[name, "published"] for name in (fitter, other))
+        between = one.errors - two.errors + (one.corners - two.corners)[:, None]
+        both = np.isfinite(between[..., :1])
+        return ratio(*((np.where(both, x, 0.0) ** 2).sum((0, 2)) for x in (between, two.errors))).root()
+
 
 def _areas(covariances: Array) -> Array:
     """m², of the one-sigma ellipses."""
@@ -144,7 +168,7 @@ def _clockwise(trials: Trials) -> Trials:
 
 
 def recorded(scans: Sequence[Scan], settings: ExtractionSettings, fitters: Sequence[str]) -> CornerStudy:
-    """Scans of a sensor at rest. A corner counts if every fitter finds it in at least half of them.
+    """Scans of a sensor at rest. A corner counts if at least half of them show it to every fitter.
 
     Raises EvaluationError if there are too few scans, or no corner that stays in its place.
     """
@@ -164,7 +188,8 @@ def recorded(scans: Sequence[Scan], settings: ExtractionSettings, fitters: Seque
             places[name][p, k] = found.xy[q]
             claims[name, "published"][p, k] = found.covariance_published[q]
             claims[name, "consistent"][p, k] = found.covariance_consistent[q]
-    seen = np.all([2 * np.isfinite(xy[..., 0]).sum(1) >= len(scans) for xy in places.values()], axis=0)
+    found_by_all = np.all([np.isfinite(xy[..., 0]) for xy in places.values()], axis=0)
+    seen = 2 * found_by_all.sum(1) >= len(scans)
     if not seen.any():
         raise EvaluationError(
             "No corner stays where it is: the sensor must stand still in a room with straight walls."

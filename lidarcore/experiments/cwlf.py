@@ -21,7 +21,7 @@ PARTS = 2 * len(CWLF_ROOMS) + 1  # that `run` tells of
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """All that was measured.
+    """All that was measured; of a recording there are environments only.
 
     times          of the chosen corner of the first room by fitter and number of measurements: figure 3
     step_times     by room, fitter and number of measurements: figures 4 and 5
@@ -41,7 +41,7 @@ def run(
     recording: Sequence[Scan] | None = None,
     done: Callable[[], None] = lambda: None,
 ) -> Result:
-    """The whole experiment, with a recording in place of the rooms for the tables, if one is given.
+    """The whole experiment, or with a recording what can be told of it: all but the chosen corners and the times.
 
     All but the times is the same for the same design, whatever the number of workers.
     Raises EvaluationError if the recording cannot be used.
@@ -51,6 +51,20 @@ def run(
         if recording is None
         else look_at(recording, design, FITTERS)
     )
+    result = Result(
+        design, environments, *(({}, {}, {}) if recording is not None else _of_chosen_corners(design))
+    )
+    done()
+    return result
+
+
+def _of_chosen_corners(
+    design: Design,
+) -> tuple[
+    dict[tuple[str, int], Times],
+    dict[tuple[str, str, int], Times],
+    dict[tuple[str, str, int], Uncertainty],
+]:
     noise, repeats, draws = design.noise, min(design.scans // 5, 50), design.scans
     growing = {n: timing.walls_of(CWLF_ROOMS[0], noise, n) for n in MEASUREMENTS}
     cells = [
@@ -59,9 +73,7 @@ def run(
         for name in FITTERS
         for n in COMPARED
     ]
-    result = Result(
-        design,
-        environments,
+    return (
         {
             (name, n): timing.times(name, walls, noise, repeats)
             for n, walls in growing.items()
@@ -73,5 +85,3 @@ def run(
             for room, name, n, walls in cells
         },
     )
-    done()
-    return result

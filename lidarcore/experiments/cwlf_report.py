@@ -8,7 +8,7 @@ from lidarcore.experiments.corner_tables import SCALE, heading, honesty, legend,
 from lidarcore.experiments.cwlf import COMPARED, FITTERS, MEASUREMENTS, Result
 from lidarcore.experiments.cwlf_claims import claims
 from lidarcore.experiments.cwlf_steps import STEPS
-from lidarcore.experiments.environments import Environment, set_up
+from lidarcore.experiments.environments import Environment, of_verdicts, set_up
 from lidarcore.experiments.figures import Bar, bars
 from lidarcore.experiments.paper_rooms import CWLF_ROOMS
 from lidarcore.experiments.plots import curves
@@ -16,6 +16,15 @@ from lidarcore.lines import FITTERS as ALL
 
 TITLE = "Corners by conditional weighted linear fitting, and by Arras and Siegwart"
 STYLES = {"arras_siegwart": "m0", "cwlf": "m1"}
+_TIMES = (
+    "Times. The steps are timed in numpy, in which a step costs some µs however few points it has; the paper does "
+    "not say in what language its steps were. The quadratic growth of Arras-Siegwart is that of the double sums "
+    "in equation 17; they factor into moments, after which both methods take time proportional to the points."
+)
+_CHOSEN = (
+    "Figures 3 to 5 are of one corner of each room: of 130° in environment A, of 90° in environment B, as in the "
+    "paper. Its beams are spread evenly over the two walls as far as they are in view, half of them on each."
+)
 _SHORT = {"arras_siegwart": "Arras-Siegwart", "cwlf": "CWLF"}
 
 
@@ -37,11 +46,20 @@ def html(result: Result) -> str:
         ),
         ("Where the corners are (figure 2)", "".join(map(_figure2, result.environments))),
         ("Can the ellipses be believed?", "".join(map(_honesty, result.environments))),
-        ("Time against the number of measurements (figure 3)", _figure3(result)),
-        ("One corner, two numbers of measurements (figures 4 and 5)", _figures45(result)),
-        ("How this was made", report.bullets(set_up(result.design, result.environments) + _of_timing())),
+        *(_of_chosen_corners(result) if result.times else []),
+        (
+            "How this was made",
+            report.bullets([*set_up(result.design, result.environments), *_methods(result)]),
+        ),
     ]
     return report.page(TITLE, lead, sections)
+
+
+def _of_chosen_corners(result: Result) -> list[tuple[str, str]]:
+    return [
+        ("Time against the number of measurements (figure 3)", _figure3(result)),
+        ("One corner, two numbers of measurements (figures 4 and 5)", _figures45(result)),
+    ]
 
 
 def _why(result: Result) -> list[str]:
@@ -53,6 +71,7 @@ def _why(result: Result) -> list[str]:
         else ""
     )
     return [
+        *of_verdicts(result.design, bool(known)),
         "Why the published uncertainty of CWLF is so small. Its weights are the inverse variances of y for an x that "
         "is known (equation 13), and 1/Σw is then taken as the variance of the line (equations 31 and 32). But x is "
         "not known: range noise moves a point along its beam, off the wall by its full component across. The "
@@ -60,9 +79,7 @@ def _why(result: Result) -> list[str]:
         f"the bearing becomes exact. {below}The consistent covariance propagates the full variance through "
         "the same estimator; but for a bias it is what scatters.",
         *_of_errors(known),
-        "Times. The steps are timed in numpy, in which a step costs some µs however few points it has; the paper does "
-        "not say in what language its steps were. The quadratic growth of Arras-Siegwart is that of the double sums "
-        "in equation 17; they factor into moments, after which both methods take time proportional to the points.",
+        *([_TIMES] if result.times else []),
     ]
 
 
@@ -204,9 +221,6 @@ def _step_bars(result: Result, room: str) -> tuple[str, str]:
     return "time of the steps, µs", bars(rows, most, least=least, title=f"Time of the four steps, {room}")
 
 
-def _of_timing() -> list[str]:
-    return [
-        "Figures 3 to 5 are of one corner of each room: of 130° in environment A, of 90° in environment B, as in the "
-        "paper. Its beams are spread evenly over the two walls as far as they are in view, half of them on each. "
-        f"Methods: {'; '.join(f'{ALL[name].title}: {ALL[name].reference}' for name in FITTERS)}."
-    ]
+def _methods(result: Result) -> list[str]:
+    methods = f"Methods: {'; '.join(f'{ALL[name].title}: {ALL[name].reference}' for name in FITTERS)}."
+    return [_CHOSEN, methods] if result.times else [methods]

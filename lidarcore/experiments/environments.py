@@ -8,6 +8,7 @@ import numpy as np
 
 from lidarcore.evaluation.trials import SEGMENTATIONS, Segmentation
 from lidarcore.evaluation.workers import run_all
+from lidarcore.experiments.claim_rules import RULES
 from lidarcore.experiments.corner_study import CornerStudy, recorded, simulated
 from lidarcore.experiments.paper_rooms import BEAMS, NOISE, Room
 from lidarcore.noise import SensorNoise
@@ -15,19 +16,45 @@ from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings
 
 QUICK_SCANS = 100
+_OF_PAPERS = (
+    "The 50 mm are the papers'. Of the bearing they give the resolution, 0.391°; half of it is assumed."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Design:
     """How an experiment is run: so many scans of each room, with the noise that every method is told.
 
-    split_threshold (m) is that of the paper, for the real segmentation.
+    split_threshold (m) is that of the paper, for the real segmentation. assumed names what of the noise nobody gave.
     """
 
     seed: int = 0
     scans: int = 2000
     noise: SensorNoise = field(default_factory=lambda: NOISE)
     split_threshold: float = 0.05
+    assumed: tuple[str, ...] = ("range", "bearing")
+
+    def with_noise(self, sigma_range: float | None, sigma_bearing: float | None) -> "Design":
+        """The same with noise (m, rad) of a sensor; None leaves what is assumed. Raises ValueError as SensorNoise."""
+        given = {"range": sigma_range, "bearing": sigma_bearing}
+        noise = SensorNoise(
+            self.noise.sigma_range if sigma_range is None else sigma_range,
+            self.noise.sigma_bearing if sigma_bearing is None else sigma_bearing,
+        )
+        return replace(self, noise=noise, assumed=tuple(name for name, of in given.items() if of is None))
+
+    @property
+    def assumption(self) -> str:
+        """What noise is assumed of a sensor that nobody described, and what to do; nothing if all was given."""
+        values = {
+            "range": f"{1e3 * self.noise.sigma_range:g} mm of range noise (--sigma-range)",
+            "bearing": f"{1e3 * self.noise.sigma_bearing:.3g} mrad of bearing noise (--sigma-bearing)",
+        }
+        what = " and ".join(values[name] for name in self.assumed)
+        return what and (
+            f"Assumed, not measured: {what}. All ellipses depend on it. "
+            "Measure the noise of the sensor with the command lidarcore calibrate and give it with these options."
+        )
 
     @property
     def settings(self) -> ExtractionSettings:
@@ -84,22 +111,26 @@ def look_at(scans: Sequence[Scan], design: Design, fitters: Sequence[str]) -> li
     return [Environment("the recording", None, scans[0].xy[scans[0].valid], study, None)]
 
 
+def of_verdicts(design: Design, simulated_rooms: bool) -> list[str]:
+    """By what rules claims are judged; and of a recording the noise that is assumed, in sentences."""
+    return [RULES, *([design.assumption] if design.assumption and not simulated_rooms else [])]
+
+
 def set_up(design: Design, environments: Sequence[Environment]) -> list[str]:
     """What was simulated, or recorded, in sentences."""
     noise = design.noise
     told = (
         f"Every method is told {1e3 * noise.sigma_range:g} mm and {np.degrees(noise.sigma_bearing):.3g}° of noise, as "
-        "independent Gaussian errors of range and bearing. The 50 mm are the papers'. Of the bearing they give the "
-        "resolution, 0.391°; half of it is assumed."
+        "independent Gaussian errors of range and bearing."
     )
     if environments[0].room is None:
         study = environments[0].study
         return [
             f"{study.scans} scans of a recording, the sensor at rest; corners: {len(study.corners)}. There is no "
             "truth: errors are those from the mean over all scans, so that a "
-            "bias common to all does not show. The "
-            "sensor may be better, or worse, than the noise the methods are told.",
-            told,
+            "bias common to all does not show. What the paper has of its own rooms and of times is left out: it is "
+            "not in the recording.",
+            f"{told} {design.assumption}".rstrip(),
         ]
     rooms = "; ".join(
         f"{e.name}, {e.room.size} with pillars, niches and cabinets, {e.room.sections} pieces of wall and "
@@ -109,7 +140,7 @@ def set_up(design: Design, environments: Sequence[Environment]) -> list[str]:
     )
     return [
         f"The papers' scans are not public. Rooms of their sizes and numbers of corners are simulated: {rooms}.",
-        told,
+        f"{told} {_OF_PAPERS}" if noise == NOISE else told,
         f"Of each room {design.scans} scans of {BEAMS} beams (0.391°) from one place, seed {design.seed}. "
         "Segments known: every beam is of the wall it truly met. Found: by iterative end point fit, threshold "
         f"{1e3 * design.split_threshold:g} mm as in the paper, and more where noise explains more; with noise of that "

@@ -3,7 +3,18 @@
 from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
+from typing import Literal
 
+Agreement = bool | None | Literal["not comparable"]
+"""Of a claim with what was measured; None: open."""
+NOT_COMPARABLE: Literal["not comparable"] = "not comparable"
+_VERDICTS: dict[Agreement, tuple[str, str]] = {
+    True: ("agrees", "agrees"),
+    False: ("differs", "differs"),
+    None: ("text", "open"),
+    NOT_COMPARABLE: ("text", NOT_COMPARABLE),
+}
+"""CSS class and word."""
 _STYLE = Path(__file__).with_suffix(".css")
 
 
@@ -44,12 +55,11 @@ def table(
     return _wide(f"<caption>{escape(caption)}</caption><tr>{cells('th', headers)}</tr>{body}")
 
 
-def verdicts(rows: Sequence[tuple[str, str, bool | None]]) -> str:
-    """Claims beside what was measured, and whether it agrees (None: open)."""
-    words = {True: ("agrees", "agrees"), False: ("differs", "differs"), None: ("text", "open")}
+def verdicts(rows: Sequence[tuple[str, str, Agreement]]) -> str:
+    """Claims beside what was measured, and whether it agrees."""
     body = "".join(
         f'<tr><td class="prose">{escape(claim)}</td><td class="prose">{escape(measured)}</td>'
-        f'<td class="{words[agrees][0]}">{words[agrees][1]}</td></tr>'
+        f'<td class="{_VERDICTS[agrees][0]}">{_VERDICTS[agrees][1]}</td></tr>'
         for claim, measured, agrees in rows
     )
     head = "".join(f'<th class="text">{name}</th>' for name in ("the paper says", "measured here", ""))

@@ -18,17 +18,20 @@ from lidarcore.scan import Scan
 
 FITTERS = ("utls", "wtls", "wctls")
 THRESHOLD = 0.04  # m, of the segmentation
-POINTS = 50  # of the wall whose fit is timed
+POINTS = (50, 500)  # of the walls whose fit is timed
 PARTS = 2 * len(WCTLS_ROOMS) + 1  # that `run` tells of
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """All that was measured; times (µs) of one compiled line fit with both covariances, by fitter."""
+    """All that was measured.
+
+    times   µs, of one compiled line fit with both covariances, by fitter and number of points; of a recording none
+    """
 
     design: Design
     environments: Sequence[Environment]
-    times: dict[str, float]
+    times: dict[tuple[str, int], float]
 
 
 def run(
@@ -47,14 +50,16 @@ def run(
         if recording is None
         else look_at(recording, design, FITTERS)
     )
-    result = Result(design, environments, {name: _time_of_fit(name, design.noise) for name in FITTERS})
+    points = POINTS if recording is None else ()
+    times = {(name, n): _time_of_fit(name, design.noise, n) for name in FITTERS for n in points}
+    result = Result(design, environments, times)
     done()
     return result
 
 
-def _time_of_fit(fitter: str, noise: SensorNoise) -> float:
+def _time_of_fit(fitter: str, noise: SensorNoise, points: int) -> float:
     """Best time, µs."""
-    bearings = np.linspace(-0.5, 0.8, POINTS)
+    bearings = np.linspace(-0.5, 0.8, points)
     ranges, row = 2 / np.cos(bearings), np.empty(LINE_FIELDS)
 
     def fit() -> int:

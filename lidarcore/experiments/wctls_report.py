@@ -5,7 +5,7 @@ import numpy as np
 from lidarcore.evaluation.consistency_design import KINDS
 from lidarcore.experiments import report
 from lidarcore.experiments.corner_tables import SCALE, heading, honesty, legend, maps, sigmas
-from lidarcore.experiments.environments import Environment, set_up
+from lidarcore.experiments.environments import Environment, of_verdicts, set_up
 from lidarcore.experiments.plots import boxes
 from lidarcore.experiments.wctls import FITTERS, Result
 from lidarcore.experiments.wctls_claims import AREAS, claims
@@ -13,6 +13,13 @@ from lidarcore.lines import FITTERS as ALL
 
 TITLE = "Corners by weighted conformal total least squares"
 STYLES = {"utls": "m0", "wtls": "m2", "wctls": "m3"}
+_OF_ROOMS = (
+    "Sizes. The paper's ellipses are larger; these are of other rooms, and of a bearing noise that the paper does "
+    "not give. Ratios between methods depend on them as well, though less.",
+    "The paper has no true positions, as it says itself: it compares claims with claims. With the truth known, the "
+    "two classical methods turn out to claim what is so, and the smaller ellipses of WCTLS to hold too few of the "
+    "corners.",
+)
 
 
 def html(result: Result) -> str:
@@ -46,35 +53,17 @@ def _why(result: Result) -> list[str]:
         else ""
     )
     return [
+        *of_verdicts(result.design, bool(known)),
         "Why WCTLS claims less. The paper takes the covariance of the conformal point Q from an earlier one and does "
-        "not print it. The information matrix of a regression with conditional variances, used here in its place, has "
-        "gains of the size that the paper reports. It counts only that part of a point's error which is left when its "
-        "coordinate along the wall is known, and that is smaller than the part across the wall at every beam that is "
-        f"not perpendicular: the claim can fall below the Cramér-Rao bound.{below}",
+        "not print it. The information matrix of a regression with conditional variances, used here in its place, "
+        "gains too; by how much depends on the room and on the bearing noise. It counts only that part of a point's "
+        "error which is left when its coordinate along the wall is known, and that is smaller than the part across "
+        "the wall at every beam that is not perpendicular: the claim can fall below the Cramér-Rao "
+        f"bound.{below}",
         "Why the normalisation is not the reason. WCTLS solves the same weighted equations as WTLS and puts every "
         "corner in the same place. To first order the covariance of a corner does not depend on the scale or the "
         "parameters its lines are written in; propagated in full (“consistent”) the two agree to the last digit.",
-        *(_of_rooms() if known else _of_recording(result)),
-    ]
-
-
-def _of_rooms() -> list[str]:
-    return [
-        "Sizes. The paper's ellipses are larger; these are of other rooms, with longer walls between corners, and of "
-        "an assumed bearing noise. What carries over are ratios between methods, and whether a claim holds.",
-        "The paper has no true positions, as it says itself: it compares claims with claims. With the truth known, the "
-        "two classical methods turn out to claim what is so, and the smaller ellipses of WCTLS to hold too few of the "
-        "corners.",
-    ]
-
-
-def _of_recording(result: Result) -> list[str]:
-    noise = result.design.noise
-    return [
-        "A claim can be no better than the noise that the methods are told, here "
-        f"{1e3 * noise.sigma_range:g} mm and {1e3 * noise.sigma_bearing:.3g} mrad. If the sensor's own, as "
-        "`lidarcore calibrate` finds it, is another, all ellipses are off by the same factor; give it with "
-        "--sigma-range and --sigma-bearing.",
+        *(_OF_ROOMS if known else ()),
     ]
 
 

@@ -4,6 +4,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from lidarcore.corners import intersect
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.places import MIN_BEAMS, MIN_EXTENT
 from lidarcore.experiments import cwlf, wctls
+from lidarcore.experiments.claim_rules import RULES
 from lidarcore.experiments.corner_study import recorded
 from lidarcore.experiments.cwlf_claims import claims as claims_of_cwlf
 from lidarcore.experiments.cwlf_steps import METHODS, corner
@@ -45,14 +47,14 @@ Command = Callable[..., str]
 
 @pytest.fixture(scope="module")
 def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
-    """Runs the real command and gives the report; what it says ends with `told`."""
+    """Runs the real command and gives the report; what it says is `before` and, after the report's path, `told`."""
 
-    def run(name: str, *options: str, told: str) -> str:
+    def run(name: str, *options: str, told: str, before: str = "") -> str:
         path = tmp_path_factory.mktemp("report") / "report.html"
         arguments = [sys.executable, "-m", "app.cli", "experiment", name, *options, "-o", str(path)]
         done = subprocess.run(arguments, capture_output=True, text=True, timeout=250)
         assert (done.returncode, done.stderr) == (0, "")
-        assert re.fullmatch(re.escape(f"{path}: ") + told + "\n", done.stdout), done.stdout
+        assert re.fullmatch(before + re.escape(f"{path}: ") + told + "\n", done.stdout), done.stdout
         return path.read_text("utf-8")
 
     return run
@@ -88,9 +90,10 @@ def test_the_tables_of_cwlf_hold_the_numbers_of_the_library(command: Command, of
     of_corners = tables["Uncertainty of the chosen corners, mm"][1:]
     for row, u in zip(of_corners, of_cwlf.uncertainties.values(), strict=True):
         assert row[3:] == [f"{1e3 * x:.2f}" for x in (*u.published, *u.scatter, *u.bound)]
-    for claim, measured, _ in claims[:8]:  # those that no clock takes part in
-        assert claim in report
-        assert measured.replace("'", "&#x27;") in report
+    for claim, measured, _ in claims[:10]:  # those that no clock takes part in
+        assert escape(claim) in report
+        assert escape(measured) in report
+    assert escape(RULES) in report
 
 
 def test_the_tables_of_wctls_hold_the_numbers_of_the_library(
@@ -199,10 +202,30 @@ def test_recordings_that_cannot_be_used_are_refused() -> None:
         recorded(empty, ExtractionSettings(), wctls.FITTERS)
 
 
-def test_a_real_recording_makes_a_report(command: Command) -> None:
-    rooms = Path(__file__).parents[2].parent / "shared" / "data" / "rplidar_csv_rooms"
-    options = ("--recording", str(rooms / "golf_room.csv.gz"), "--workers", "1")
-    report = command("wctls", *options, told="8 claims.*")
-    assert_complete(report, (3, 4))
-    assert "scans of a recording" in report
-    assert "least possible" not in report
+ROOMS = Path(__file__).parents[2].parent / "shared" / "data" / "rplidar_csv_rooms"
+ASSUMED = "Assumed, not measured: 50 mm of range noise (--sigma-range) and 3.49 mrad of bearing noise (--sigma-bearing)"
+
+
+@pytest.mark.parametrize("name", ["cwlf", "wctls"])
+def test_a_real_recording_makes_a_report_of_nothing_else(command: Command, name: str) -> None:
+    options = ("--recording", str(ROOMS / "golf_room.csv.gz"), "--scans", "60", "--workers", "1")
+    number = {"cwlf": 3, "wctls": 7}[name]
+    before = re.escape(ASSUMED) + ".*lidarcore calibrate.*\n"
+    report = command(name, *options, told=rf"{number} claims of the paper: agree \d+, .*", before=before)
+    assert_complete(report, {"cwlf": (), "wctls": (3, 4)}[name])
+    assert "60 scans of a recording" in report
+    assert ASSUMED in report
+    assert not re.search(
+        "least possible|environment A|environment B|not comparable<|Time against|timed", report
+    )
+
+
+def test_of_noise_that_is_given_nothing_is_assumed(command: Command) -> None:
+    options = ("--recording", str(ROOMS / "golf_room.csv.gz"), "--scans", "60", "--sigma-range", "0.04")
+    before = re.escape("Assumed, not measured: 3.49 mrad of bearing noise (--sigma-bearing).") + ".*\n"
+    assert "of range noise (--sigma-range)" not in command(
+        "wctls", *options, told="7 claims.*", before=before
+    )
+    report = command("wctls", *options, "--sigma-bearing", "0.003", told="7 claims.*")
+    assert "Assumed" not in report
+    assert "40 mm and 0.172° of noise" in report
