@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from app.calibration_wire import CalibrationJson, CalibrationStateJson, State, calibration_json
@@ -51,8 +52,9 @@ class _Job:
 class LiveCalibration:
     """Is told of every frame and of every change of source; any thread may call any method."""
 
-    def __init__(self, player: Player) -> None:
-        self._player = player
+    def __init__(self, player: Player, ready: Callable[[], bool]) -> None:
+        """`ready` tells whether scans can come: kernels are compiled first."""
+        self._player, self._ready = player, ready
         self._job = _Job()
         self._lock = threading.Lock()
 
@@ -100,17 +102,22 @@ class LiveCalibration:
         """How far it is, and what was found."""
         with self._lock:
             job = self._job
-            message = job.message
-            if job.state == "collecting" and time.monotonic() - job.latest > PATIENCE:
-                message = "No new scans come: is the source paused, at its end or unplugged?"
             return {
                 "state": job.state,
                 "source": job.name,
                 "scans": job.count,
                 "wanted": job.wanted,
-                "message": message,
+                "message": self._waits_for() if job.state == "collecting" else job.message,
                 "result": job.result,
             }
+
+    def _waits_for(self) -> str | None:
+        if not self._ready():
+            self._job.latest = time.monotonic()  # patience begins afterwards
+            return "The kernels are still being compiled: scans are taken as soon as that is done."
+        if time.monotonic() - self._job.latest > PATIENCE:
+            return "No new scans come: is the source paused, at its end or unplugged?"
+        return None
 
     def _calculate(self, job: _Job) -> None:
         try:

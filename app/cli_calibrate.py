@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli_options import RecordingPath, Topic
+from app.cli_options import RecordingPath, SettingsFile, Topic, check_folder, settings_from
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
     from app.calibration_wire import BandsJson, CalibrationJson, IntervalJson
+    from lidarcore import SensorNoise
+    from lidarcore.evaluation.calibration import Calibration
 
 DEGREES = math.degrees(1)
 
@@ -29,19 +31,27 @@ def calibrate(
         int | None, typer.Option(min=1, help="scans to take, 100 suffice; all if not given")
     ] = None,
     topic: Topic = None,
+    settings: SettingsFile = None,
     json: Annotated[
         bool, typer.Option("--json", help="all of it as JSON instead of a table, m and rad")
     ] = False,
 ) -> None:
-    """The noise of a sensor from a recording made while it stood still in a room."""
+    """The noise of a sensor from a recording made while it stood still in a room.
+
+    Where one of its two numbers cannot be told, the file keeps that of --settings, or the default.
+    """
     from pydantic_core import to_json
     from rich.console import Console
 
     from app.calibration_wire import calibration_json
-    from app.profiles import Profile
-    from lidarcore import files, open_recording
+    from lidarcore import open_recording
+    from lidarcore.evaluation import consistency_tables
     from lidarcore.evaluation.calibration import calibrate as run
 
+    if output is not None:
+        consistency_tables.check(output, (".json",))
+        check_folder(output)
+    usual = settings_from(settings, None).extraction.noise
     result = run(islice(open_recording(recording, topic), skip, None if scans is None else skip + scans))
     found = calibration_json(result)
     if json:
@@ -49,7 +59,26 @@ def calibrate(
     else:
         _show(Console(), found)
     if output is not None:
-        files.write(output, Profile.of(result.noise).text)
+        _write(output, result, usual)
+
+
+def _write(output: Path, result: "Calibration", usual: "SensorNoise") -> None:
+    from app.profiles import Profile
+    from lidarcore import files
+    from lidarcore.errors import EvaluationError
+
+    kept = [
+        f"{name} {1e3 * getattr(usual, name):g} {unit}"
+        for name, unit, told in zip(
+            ("sigma_range", "sigma_bearing"), ("mm", "mrad"), result.told, strict=True
+        )
+        if told is None
+    ]
+    if len(kept) == len(result.told):
+        raise EvaluationError(f"Neither noise can be told here, so {output} is not written.")
+    files.write(output, Profile.of(result.noise_or(usual)).text)
+    if kept:
+        typer.echo(f"{output} keeps {kept[0]} of the settings: it cannot be told here.", err=True)
 
 
 def _show(console: "Console", found: "CalibrationJson") -> None:
@@ -66,8 +95,8 @@ def _table(found: "CalibrationJson") -> "Table":
     from rich.table import Table
 
     table = Table("", "", "95 %")
-    table.add_row("sigma_bearing, mrad", *_cells(found["sigma_bearing"]))
-    table.add_row("sigma_range, mm", *_cells(found["sigma_range"]))
+    table.add_row("sigma_bearing, mrad", *_told(found["sigma_bearing"]))
+    table.add_row("sigma_range, mm", *_told(found["sigma_range"]))
     _add_bands(table, "range", found["by_range"], 1.0, "m")
     _add_bands(table, "incidence", found["by_incidence"], DEGREES, "°")
     table.add_section()
@@ -81,12 +110,16 @@ def _add_bands(table: "Table", title: str, bands: "BandsJson", factor: float, un
     verdict = "differs" if bands["differs"] else "the same"
     table.add_row(f"sigma_range by {title}, mm", verdict, f"p = {bands['p_value']:.2g}")
     for low, high, sigma in zip(bands["edges"][:-1], bands["edges"][1:], bands["sigmas"], strict=True):
-        table.add_row(f"  {factor * low:.2f} to {factor * high:.2f} {unit}", *_cells(sigma))
+        table.add_row(f"  {factor * low:.2f} to {factor * high:.2f} {unit}", *_told(sigma))
+
+
+def _told(sigma: "IntervalJson") -> tuple[str, str]:
+    return _cells(sigma) if sigma["low"] > 0 else ("cannot be told", f"at most {1e3 * sigma['high']:.2f}")
 
 
 def _cells(figure: "IntervalJson | None", factor: float = 1e3) -> tuple[str, str]:
     if figure is None:
-        return "not seen", ""
+        return "cannot be told", ""
     return f"{factor * figure['value']:.2f}", f"{factor * figure['low']:.2f} to {factor * figure['high']:.2f}"
 
 

@@ -1,5 +1,6 @@
 """Options that several commands share, and the settings they make."""
 
+import errno
 import json
 import signal
 from collections.abc import Callable, Iterator
@@ -30,6 +31,14 @@ def end_like_ctrl_c() -> None:
         number = getattr(signal, name, None)  # Windows has no SIGHUP
         if number and signal.getsignal(number) == signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)
+
+
+def check_folder(file: Path, option: str = "--output") -> None:
+    """Told before minutes of work are lost. Raises FileNotFoundError unless there can be a file of that name."""
+    if file.is_dir() or not file.absolute().parent.is_dir():
+        raise FileNotFoundError(
+            errno.ENOENT, f"is no file in a folder that exists, give one for {option}", str(file)
+        )
 
 
 @contextmanager

@@ -1,6 +1,7 @@
 """Noise profiles: files NAME.json of settings that hold the noise of one sensor, in one folder."""
 
-from dataclasses import dataclass
+import threading
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -64,6 +65,7 @@ class Profiles:
     """Those in one folder, which is made when the first is written. Nothing is written outside."""
 
     folder: Path
+    _writing: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False, compare=False)
 
     def list(self) -> list[ProfileEntryJson]:
         """All that are there, by name; what cannot be read is listed with its problem."""
@@ -92,16 +94,17 @@ class Profiles:
     def write(self, name: str, profile: Profile, *, overwrite: bool) -> ProfileEntryJson:
         """Raises ProblemError 409 if the name is taken, 422 if it is no plain name, 507 if nothing can be written."""
         path = self._path(name)
-        if path.exists() and not overwrite:
-            raise ProblemError(
-                409, f"There is a profile {name!r} already: replace it or choose another name."
-            )
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            files.write(path, profile.text)
-        except OSError as error:
-            raise ProblemError(507, f"The profile could not be saved: {error.strerror}.") from error
-        return self._entry(name)
+        with self._writing:  # nobody takes the name between the look and the file
+            if path.exists() and not overwrite:
+                raise ProblemError(
+                    409, f"There is a profile {name!r} already: replace it or choose another name."
+                )
+            try:
+                self.folder.mkdir(parents=True, exist_ok=True)
+                files.write(path, profile.text)
+            except OSError as error:
+                raise ProblemError(507, f"The profile could not be saved: {error.strerror}.") from error
+        return {"name": name, "noise": profile.noise, "problem": None}
 
     def delete(self, name: str) -> None:
         """Raises ProblemError 404 if there is none, 422 if that is no plain name or the file cannot be deleted."""

@@ -95,7 +95,7 @@ def create_app(options: ServerOptions) -> FastAPI:
     measured.watch(runtime, hub, recording)
     standing = LiveRepeatability()
     runtime.frame_listeners.append(standing.tell)
-    calibrating = LiveCalibration(runtime.player)
+    calibrating = LiveCalibration(runtime.player, lambda: runtime.ready)
     runtime.frame_listeners.append(calibrating.tell)
     runtime.change_listeners.append(calibrating.look)
     laboratory = Studies(options.recordings.parent / STUDIES)

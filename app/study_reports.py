@@ -11,7 +11,7 @@ from typing_extensions import TypedDict
 
 from app.problems import ProblemError
 from app.study_kinds import KINDS
-from lidarcore.files import write
+from lidarcore.files import partials, write
 
 MOST = 100  # reports kept; the user deletes what is not needed any more
 NAME = re.compile(rf"({'|'.join(KINDS)})_\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d(_\d+)?")
@@ -33,7 +33,7 @@ class Reports:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        for left in folder.glob(".*.html.part"):  # by a study that was killed while it wrote
+        for left in partials(folder, "*.html"):  # by a study that was killed while it wrote
             left.unlink(missing_ok=True)
 
     def all(self) -> list[ReportJson]:
@@ -76,7 +76,7 @@ class Reports:
 
     def discard(self, path: Path) -> None:
         """Remove what a study that came to nothing may have left."""
-        for left in (path, path.with_suffix(".json"), path.with_name(f".{path.name}.part")):
+        for left in (path, path.with_suffix(".json"), *partials(self.folder, path.name)):
             left.unlink(missing_ok=True)
 
 

@@ -1,19 +1,31 @@
 """Files that are whole or not there."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
+
+_NUMBERS = count()
 
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A file beside the path that takes its place at the end, or goes away if something fails."""
-    partial = path.with_name(f".{path.name}.part")
+    """A file beside the path that takes its place at the end, or goes away if something fails.
+
+    Its name is of its own, so that several may write the same file at once; the last one to end stays.
+    """
+    partial = path.with_name(f".{path.name}.{os.getpid()}-{next(_NUMBERS)}.part")
     try:
         yield partial
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def partials(folder: Path, name: str) -> Iterator[Path]:
+    """What those that were killed while they wrote files of that name, a glob pattern, have left."""
+    return folder.glob(f".{name}.*-*.part")
 
 
 def write(path: Path, text: str) -> None:

@@ -83,6 +83,8 @@ def start(
 ) -> CalibrationStateJson:
     """Measure the noise from the next scans of what plays; the sensor has to stand still in a room with walls.
 
+    What is null in the `noise` found could not be told: keep what the settings say.
+
     All of a recording is taken if it has fewer scans. Ask GET until the state is done or failed.
     """
     try:

@@ -48,11 +48,30 @@ class Calibration:
     beams: int
 
     @property
+    def told(self) -> tuple[float | None, float | None]:
+        """sigma_range (m) and sigma_bearing (rad) as settings take them, or None where the interval begins at 0.
+
+        Such a sigma cannot be told from none at all: its value says nothing, only its upper end does.
+        Within 0.1 mm to 1 m and 0.01 to 50 mrad.
+        """
+        return _told(self.sigma_range, 1e-4, 1.0), _told(self.sigma_bearing, 1e-5, 0.05)
+
+    @property
     def noise(self) -> SensorNoise:
-        """For the settings of extraction: 0.1 mm to 1 m and 0.01 to 50 mrad, also where nothing could be seen."""
+        """For the settings of extraction: what could be told, and the default of SensorNoise where nothing could."""
+        return self.noise_or(SensorNoise())
+
+    def noise_or(self, other: SensorNoise) -> SensorNoise:
+        """The same with what another noise says, such as the one in use, where nothing could be told."""
+        sigma_range, sigma_bearing = self.told
         return SensorNoise(
-            min(max(self.sigma_range.value, 1e-4), 1.0), min(max(self.sigma_bearing.value, 1e-5), 0.05)
+            other.sigma_range if sigma_range is None else sigma_range,
+            other.sigma_bearing if sigma_bearing is None else sigma_bearing,
         )
+
+
+def _told(sigma: Interval, least: float, most: float) -> float | None:
+    return min(max(sigma.value, least), most) if sigma.low > 0 else None
 
 
 def calibrate(scans: Iterable[Scan]) -> Calibration:
@@ -60,7 +79,7 @@ def calibrate(scans: Iterable[Scan]) -> Calibration:
 
     On a wall, an error of the bearing acts on the range with the lever rho tan(incidence): the variance of residuals
     is sigma_range² + lever² sigma_bearing². Only what changes from scan to scan counts, not the shape of the wall.
-    Raises EvaluationError if there are too few scans, no walls, or the sensor moved.
+    Raises EvaluationError if there are too few scans, no walls, or the sensor moved; and if no noise fits the scatter.
     """
     taken = list(scans)
     if len(taken) < LEAST_SCANS:

@@ -20,13 +20,13 @@ export const calibrationResult = (result, from, noise) => [
   figures(result, from),
   ...result.remarks.map((remark) => el("p", { class: "muted remark" }, remark)),
   bandFigure(result),
-  actions(result.noise, noise),
+  ...actions(result.noise, noise),
 ];
 
 function figures(result, from) {
   const lines = [
-    ["Range noise, 1σ", spread(result.sigma_range, MM, 2, "mm")],
-    ["Bearing noise, 1σ", spread(result.sigma_bearing, DEGREES, 3, "°")],
+    ["Range noise, 1σ", sigma(result.sigma_range, MM, 2, "mm")],
+    ["Bearing noise, 1σ", sigma(result.sigma_bearing, DEGREES, 3, "°")],
     ["Outliers", spread(result.outliers, 100, 2, "%")],
     ["Range bias", spread(result.range_bias, MM, 1, "mm")],
     ["Alignment", spread(result.alignment, DEGREES, 2, "°")],
@@ -36,6 +36,12 @@ function figures(result, from) {
   const pairs = lines.map(([name, text]) => el("div", {}, el("dt", {}, name), el("dd", { title: text }, text)));
   return el("dl", { class: "facts", "aria-label": "Result, with 95 % confidence intervals" }, ...pairs);
 }
+
+/** A noise whose interval begins at 0 cannot be told from none. */
+const sigma = (figure, factor, digits, unit) =>
+  figure.low > 0
+    ? spread(figure, factor, digits, unit)
+    : `cannot be told, at most ${fixed(factor * figure.high, digits)}\u2009${unit}`;
 
 function spread(figure, factor, digits, unit) {
   if (!figure) return "cannot be told";
@@ -98,7 +104,13 @@ const describe = (band) => {
   return `${title(band)}. ${told.join(", ")}.`;
 };
 
-function actions(found, set) {
+/** What to do with the noise that could be told, beside what is set where it could not. */
+function actions(told, set) {
+  if (told.sigma_range === null && told.sigma_bearing === null) return [];
+  const found = {
+    sigma_range: told.sigma_range ?? set.sigma_range,
+    sigma_bearing: told.sigma_bearing ?? set.sigma_bearing,
+  };
   const inUse = sameNoise(found, set);
   const use = el(
     "button",
@@ -117,11 +129,6 @@ function actions(found, set) {
     event.preventDefault();
     saveProfile(name.value.trim(), found);
   };
-  return el(
-    "form",
-    { class: "fields", id: "calibration-save", onsubmit: save },
-    use,
-    name,
-    el("button", { type: "submit", class: "button", "data-key": "save" }, "Save as profile"),
-  );
+  const saving = el("button", { type: "submit", class: "button", "data-key": "save" }, "Save as profile");
+  return [el("form", { class: "fields", id: "calibration-save", onsubmit: save }, use, name, saving)];
 }

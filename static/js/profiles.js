@@ -1,6 +1,6 @@
 // Noise profiles: chosen, saved, deleted, exported and imported as the files that `lidarcore calibrate` writes.
 
-import { address, request, send } from "./api.js";
+import { Problem, address, request, send } from "./api.js";
 import { $, el, icon, iconButton, remake } from "./dom.js";
 import { attempt, settings } from "./session.js";
 import { on, set } from "./store.js";
@@ -56,9 +56,15 @@ async function put(name, body, overwrite = false) {
     });
     await listProfiles();
   } catch (problem) {
-    if (problem.status !== 409) report(problem, "The profile was not saved");
-    else offerOverwrite(name, body);
+    if (problem.status === 409) offerOverwrite(name, body);
+    else report(inWords(problem), "The profile was not saved");
   }
+}
+
+/** What is wrong with the content of a file comes with `errors`, and is told as the list of profiles tells it. */
+function inWords(problem) {
+  if (!problem.members?.errors) return problem;
+  return new Problem({ ...problem, detail: `The file is no profile: ${problem.message.replace(/^\/: /, "")}.` });
 }
 
 const pathOf = (name) => `profiles/${encodeURIComponent(name)}`;

@@ -1,15 +1,20 @@
 """Calibration and noise profiles over REST: a real server, recordings whose noise is known, files on the disk."""
 
+import asyncio
 import json
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
+import httpx
 import numpy as np
 import pytest
 from serving import Json, Server, assert_problem, chosen
 from waiting import wait_until
 
 from app.cli_options import settings_from
+from app.live import DeviceOptions
+from app.server import ServerOptions, create_app
 from lidarcore import Client, SensorNoise
 from lidarcore.simulation import SimulatedSensor
 from lidarcore.simulation.rooms import rectangular_room
@@ -89,6 +94,29 @@ def test_a_scan_that_is_shown_again_while_paused_counts_once(server: Server, sta
     wait_until(lambda: server.get("/calibration")["scans"] > 2)
 
 
+def test_before_the_kernels_are_compiled_it_says_so(tmp_path: Path) -> None:
+    """An app that was not started yet: nothing is compiled, and nothing plays."""
+    app = create_app(ServerOptions(recordings=tmp_path, device=DeviceOptions(emulated=True)))
+
+    async def ask(method: str) -> Json:
+        transport = httpx.ASGITransport(app)
+        async with httpx.AsyncClient(transport=transport, base_url="http://127.0.0.1/api/v1") as client:
+            body = {"json": {}} if method == "POST" else {}
+            return (await client.request(method, "/calibration", **body)).raise_for_status().json()
+
+    try:
+        asyncio.run(ask("POST"))
+        state = asyncio.run(ask("GET"))
+        assert state["state"] == "collecting"
+        assert "kernels are still being compiled" in state["message"]
+        app.state.runtime.ready = True
+        assert asyncio.run(ask("GET"))["message"] is None
+    finally:
+        app.state.runtime.player.close()
+        app.state.viser.stop()
+        app.state.landmarks.close()
+
+
 def test_one_at_a_time_and_cancelled(server: Server, standing: Path) -> None:
     server.play(standing, paused=True)
     server.change("POST", "/calibration", {"scans": 20})
@@ -144,6 +172,34 @@ def test_a_name_that_is_taken_is_replaced_only_on_demand(server: Server) -> None
     assert server.get("/profiles/hall") == PROFILE
     server.http.put("/profiles/hall", json=other, params={"overwrite": True}).raise_for_status()
     assert server.get("/profiles/hall") == other
+
+
+def put_at_once(server: Server, bodies: list[Json], **params: object) -> list[int]:
+    """The statuses of as many requests for one name, all under way at the same time."""
+    start, statuses = threading.Barrier(len(bodies)), []
+
+    def put(body: Json) -> None:
+        start.wait()
+        statuses.append(server.http.put("/profiles/hall", json=body, params=params).status_code)
+
+    threads = [threading.Thread(target=put, args=(body,)) for body in bodies]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return sorted(statuses)
+
+
+def test_many_who_save_at_once_do_not_disturb_each_other(server: Server) -> None:
+    bodies = [
+        {"extraction": {"noise": {"sigma_range": 0.01 * n, "sigma_bearing": 0.001}}} for n in range(1, 17)
+    ]
+    for _ in range(5):
+        assert put_at_once(server, bodies) == [201] + [409] * 15
+        assert put_at_once(server, bodies, overwrite=True) == [201] * 16
+        assert server.get("/profiles/hall") in bodies
+        server.http.delete("/profiles/hall").raise_for_status()
+    assert list((server.folder.parent / "profiles").iterdir()) == []
 
 
 @pytest.mark.parametrize(

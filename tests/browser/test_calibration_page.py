@@ -5,12 +5,16 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from browsing import Server, Visitor
 from playwright.sync_api import Locator, expect
 from waiting import wait_until
 
+from lidarcore import SensorNoise
 from lidarcore.rplidar.emulator_process import EmulatorProcess
+from lidarcore.simulation import SimulatedSensor
+from lidarcore.simulation.world import World
 
 SIGMA_RANGE, SIGMA_BEARING = 0.015, 0.002
 PROFILE = {"extraction": {"noise": {"sigma_range": 0.031, "sigma_bearing": 0.0015}}}
@@ -97,6 +101,31 @@ def test_noise_of_a_sensor_is_found_used_and_kept_as_a_profile(
     assert noise(server) == found["noise"]
 
 
+def test_what_cannot_be_told_is_said_and_what_is_set_stays(visitor: Visitor, tmp_path: Path) -> None:
+    """A narrow view of one wall: a bearing error does nothing there."""
+    server, page = visitor.server, visitor.page
+    world = World(np.array([[[2.0, -3.0], [2.0, 3.0]]]))
+    emitter, rng = SimulatedSensor(world, SensorNoise(0.02, 0.001), beams=3600), np.random.default_rng(0)
+    scans = [emitter.scan(np.zeros(3), rng)[0] for _ in range(30)]
+    ranges = np.array([np.where(np.abs(s.bearings) < 0.15, s.ranges, np.nan) for s in scans])
+    file = tmp_path / "narrow.npz"
+    np.savez(file, ranges=ranges, bearings=scans[0].bearings, stamps=0.01 * np.arange(len(scans)))
+    server.api.put("recordings/narrow.npz", content=file.read_bytes()).raise_for_status()
+    server.api.put("source", json={"kind": "recording", "name": "narrow.npz"}).raise_for_status()
+    server.patch("settings", {"extraction": {"noise": {"sigma_bearing": 0.0042}}})
+    page.get_by_role("button", name="Calibrate").click()
+    facts = page.locator("#calibration-result dl")
+    expect(facts).to_be_visible(timeout=120_000)
+    expect(facts).to_contain_text(re.compile(r"Bearing noise, 1σ\s*cannot be told, at most [\d.]+.°"))
+    expect(facts).to_contain_text(re.compile(r"Range bias\s*cannot be told"))
+    expect(page.locator("#calibration-result")).to_contain_text("the one that is set should stay")
+    page.get_by_role("button", name="Use", exact=True).click()
+    expect(page.get_by_role("button", name="In use", exact=True)).to_be_disabled()
+    found = server.get("calibration")["result"]["noise"]
+    assert found["sigma_bearing"] is None
+    assert noise(server) == found | {"sigma_bearing": 0.0042}
+
+
 def test_a_second_start_is_refused_and_shows_the_one_that_runs(visitor: Visitor) -> None:
     visitor.tolerated.append("409")
     server, page = visitor.server, visitor.page
@@ -136,7 +165,11 @@ def test_files_are_imported_replaced_on_demand_or_refused(visitor: Visitor, tmp_
     page.get_by_label("Profile to import").set_input_files(good)
     page.get_by_role("button", name="Replace it").click()
     page.get_by_label("Profile to import").set_input_files(bad)
-    expect(page.locator(".toast.error")).to_contain_text("extraction")
+    toast = page.locator(".toast.error")
+    expect(toast).to_contain_text("The file is no profile: /extraction: Field required; ")
+    bad.write_text("no JSON")
+    page.get_by_label("Profile to import").set_input_files(bad)
+    expect(toast.last).to_contain_text(re.compile("The file is no profile: .*JSON"))
     assert [entry["name"] for entry in server.get("profiles")["profiles"]] == ["lab"]
 
 

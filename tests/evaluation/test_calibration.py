@@ -4,7 +4,7 @@ import csv
 import gzip
 import json
 from dataclasses import replace
-from itertools import groupby, islice
+from itertools import groupby, islice, pairwise
 
 import numpy as np
 import pytest
@@ -136,17 +136,26 @@ def test_a_single_short_wall_is_refused():
         calibrate([sensor.scan(np.zeros(3), rng)[0] for _ in range(20)])
 
 
-def test_what_a_bearing_error_does_cannot_be_seen_on_walls_square_to_the_beam():
-    """A narrow view of one wall says nothing on sigma_bearing: its interval reaches down to 0."""
+def narrow_view():
+    """Of one wall, square to the beams: what a bearing error does cannot be seen."""
     world = World(np.array([[[2.0, -3.0], [2.0, 3.0]]]))
     sensor, rng = SimulatedSensor(world, SensorNoise(0.02, 0.001), beams=3600), np.random.default_rng(0)
-    scans = []
-    for _ in range(30):
-        scan = sensor.scan(np.zeros(3), rng)[0]
-        scans.append(replace(scan, ranges=np.where(np.abs(scan.bearings) < 0.15, scan.ranges, np.nan)))
-    result = calibrate(scans)
+    scans = [sensor.scan(np.zeros(3), rng)[0] for _ in range(30)]
+    return [replace(s, ranges=np.where(np.abs(s.bearings) < 0.15, s.ranges, np.nan)) for s in scans]
+
+
+def test_a_noise_that_cannot_be_told_is_not_made_up():
+    """The interval of sigma_bearing reaches down to 0: what is set stays, or the default."""
+    result = calibrate(narrow_view())
     assert_near(result.sigma_range, 0.02)
     assert result.sigma_bearing.low == 0
+    assert result.told == (result.sigma_range.value, None)
+    assert result.noise == SensorNoise(result.sigma_range.value, SensorNoise().sigma_bearing)
+    assert result.noise_or(SensorNoise(0.5, 0.0042)) == SensorNoise(result.sigma_range.value, 0.0042)
+    assert calibration_json(result)["noise"] == {
+        "sigma_range": result.sigma_range.value,
+        "sigma_bearing": None,
+    }
 
 
 @pytest.mark.real_data
@@ -159,15 +168,49 @@ def test_a_real_sensor_at_rest_has_more_noise_far_away(data, station):
     for _, samples in groupby(rows, key=lambda row: row["rev"]):
         mm, degrees = np.array([(row["distance_mm"], row["angle_deg"]) for row in samples], float).T
         scans.append(Scan(mm / 1e3, np.radians(-degrees)))
+    assert_scatter_is_that_of_numpy(calibrate(scans), scans)
     halves = [calibrate(part) for part in (scans[: len(scans) // 2], scans[len(scans) // 2 :])]
     for half in halves:
         print(half)
-        assert 2e-4 < half.sigma_range.value < 0.02
         assert half.by_range.sigmas[0].high < half.by_range.sigmas[2].low
         assert half.by_range.p_value < 1e-3
         assert half.outliers.value < 0.03
     near = [half.by_range.sigmas[0] for half in halves]
     assert max(i.low for i in near) < 2 * min(i.high for i in near)
+
+
+def assert_scatter_is_that_of_numpy(result, scans):
+    """Where beams meet walls squarely, bearings do not matter: in the nearest band that has several, within 3 sigma."""
+    edges, square = result.by_range.edges, list(square_beams(scans))
+    inside = [[v for r, v in square if low <= r < high] for low, high in pairwise(edges)]
+    sigma, variances = next(
+        (sigma, np.array(v)) for sigma, v in zip(result.by_range.sigmas, inside, strict=True) if len(v) >= 5
+    )
+    error = variances.std(ddof=1) / np.sqrt(len(variances))
+    print(f"{1e3 * sigma.value:.2f} mm, by numpy {1e3 * np.sqrt(variances.mean()):.2f} mm")
+    assert error < 0.3 * variances.mean()
+    known = (sigma.high**2 - sigma.low**2) / 4
+    assert abs(sigma.value**2 - variances.mean()) < 3 * np.hypot(error, known)
+
+
+def square_beams(scans):
+    """Range and variance of ranges in each degree where a straight wall is met squarely: 1 / range is a cosine."""
+    ranges = np.concatenate([scan.ranges for scan in scans])
+    degree = np.degrees(np.concatenate([scan.bearings for scan in scans])).astype(int) % 360
+    seen = np.isfinite(ranges) & (ranges > 0)
+    inside = [ranges[seen & (degree == d)] for d in range(360)]
+    medians = np.array([np.median(r) if len(r) >= 30 else np.nan for r in inside])
+    offsets = np.arange(-4, 5)
+    A = np.column_stack([np.cos(np.radians(offsets)), np.sin(np.radians(offsets))])
+    for d in range(360):
+        around = medians[(d + offsets) % 360]
+        if not np.isfinite(around).all():
+            continue
+        cosine, sine = np.linalg.lstsq(A, 1 / around)[0]
+        straight = np.abs(1 / (A @ [cosine, sine]) - around).max() < 0.01
+        if straight and abs(sine / cosine) < 0.1:
+            off = np.abs(inside[d] - medians[d])
+            yield medians[d], inside[d][off <= 6 * 1.4826 * max(np.median(off), 1e-4)].var(ddof=1)
 
 
 def test_the_command_writes_a_noise_that_extraction_takes(data, tmp_path):
@@ -183,6 +226,56 @@ def test_the_command_writes_a_noise_that_extraction_takes(data, tmp_path):
     assert settings_from(profile, None).extraction.noise == calibrate(scans).noise
 
 
+@pytest.mark.parametrize("arguments", [[], ["--settings"]], ids=["the default", "settings"])
+def test_the_command_keeps_what_cannot_be_told(tmp_path, arguments):
+    recording, profile = save(narrow_view(), tmp_path / "narrow.npz"), tmp_path / "noise.json"
+    kept = SensorNoise()
+    if arguments:
+        kept = SensorNoise(0.5, 0.0042)
+        settings = tmp_path / "settings.json"
+        settings.write_text('{"extraction": {"noise": {"sigma_range": 0.5, "sigma_bearing": 0.0042}}}')
+        arguments = [*arguments, str(settings)]
+    result = CliRunner().invoke(cli, ["calibrate", str(recording), "-o", str(profile), *arguments])
+    assert result.exit_code == 0, result.output
+    words = " ".join(result.output.split())
+    assert "cannot be told" in words
+    assert f"keeps sigma_bearing {1e3 * kept.sigma_bearing:g} mrad" in words
+    found = calibrate(narrow_view())
+    assert settings_from(profile, None).extraction.noise == SensorNoise(
+        found.sigma_range.value, kept.sigma_bearing
+    )
+
+
+@pytest.mark.real_data
+def test_the_command_writes_no_profile_of_nothing(data, tmp_path):
+    """In a real recording whose bins scatter too differently for either number."""
+    recording, profile = data / "rplidar_csv_rooms" / "nut_room.csv.gz", tmp_path / "noise.json"
+    result = CliRunner().invoke(cli, ["calibrate", str(recording), "-o", str(profile)])
+    assert result.exit_code != 0
+    assert "Neither noise can be told" in str(result.exception) + result.output
+    assert not profile.exists()
+
+
+@pytest.mark.parametrize(
+    ("output", "said"),
+    [("nosuch/x.json", "is no file in a folder that exists"), ("x.txt", "should end in .json")],
+)
+def test_the_command_refuses_an_output_before_it_reads(tmp_path, output, said):
+    """The recording is not there either, and would be told of next."""
+    result = CliRunner().invoke(
+        cli, ["calibrate", str(tmp_path / "missing.npz"), "-o", str(tmp_path / output)]
+    )
+    assert result.exit_code != 0
+    assert said in str(result.exception) + result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def save(scans, path):
+    arrays = {name: np.array([getattr(scan, name) for scan in scans]) for name in ("ranges", "bearings")}
+    np.savez(path, **arrays, stamps=100 + 0.1 * np.arange(len(scans)))
+    return path
+
+
 def test_the_command_writes_json(data):
     recording = data / "rplidar_csv_rooms" / "mapping_keng.csv.gz"
     result = CliRunner().invoke(cli, ["calibrate", str(recording), "--skip", "5", "--scans", "100", "--json"])
@@ -193,12 +286,8 @@ def test_the_command_writes_json(data):
 
 def test_words_say_what_cannot_be_told():
     """A narrow view of one wall; then a plain room, with and without a bias."""
-    world = World(np.array([[[2.0, -3.0], [2.0, 3.0]]]))
-    sensor, rng = SimulatedSensor(world, SensorNoise(0.02, 0.001), beams=3600), np.random.default_rng(0)
-    narrow = [sensor.scan(np.zeros(3), rng)[0] for _ in range(30)]
-    narrow = [replace(s, ranges=np.where(np.abs(s.bearings) < 0.15, s.ranges, np.nan)) for s in narrow]
-    bearing, bias, alignment = calibration_json(calibrate(narrow))["remarks"]
-    assert "cannot be told from 0" in bearing
+    bearing, bias, alignment = calibration_json(calibrate(narrow_view()))["remarks"]
+    assert "The bearing noise cannot be told here (at most" in bearing
     assert "cannot be told" in bias
     assert "cannot be told" in alignment
     scans = standing(SensorNoise(0.005, 0.001), 8, rectangular_room(5, 4))
@@ -208,3 +297,43 @@ def test_words_say_what_cannot_be_told():
     assert "too long by" in calibration_json(calibrate(longer))["remarks"][0]
     shorter = [replace(scan, ranges=scan.ranges - 0.03) for scan in scans]
     assert "too short by" in calibration_json(calibrate(shorter))["remarks"][0]
+
+
+def test_a_bias_known_to_a_decimetre_only_is_no_figure():
+    result = calibrate(standing(SensorNoise(0.005, 0.001), 8, rectangular_room(5, 4)))
+    known = calibration_json(result)
+    assert known["range_bias"]["value"] == result.range_bias.value
+    vague = calibration_json(replace(result, range_bias=Interval(-0.85, -1.99, 0.287)))
+    assert vague["range_bias"] is None
+    assert any("range bias cannot be told" in remark for remark in vague["remarks"])
+
+
+def remarks(scans):
+    return " ".join(calibration_json(calibrate(scans))["remarks"])
+
+
+def rougher(scans, sigma):
+    """With more noise in the ranges, as the function of a scan has it (m)."""
+    rng = np.random.default_rng(0)
+    return [
+        replace(scan, ranges=scan.ranges + rng.normal(0, 1, len(scan)) * sigma(scan.ranges)) for scan in scans
+    ]
+
+
+def test_words_say_where_one_number_fits_badly():
+    scans = standing(SensorNoise(0.005, 0.001), 2)
+    said = remarks(scans)
+    assert "Range noise" not in said
+    assert "drifted" not in said
+    grows = remarks(rougher(scans, lambda ranges: 0.005 * ranges))
+    assert (
+        "grows with distance: one number fits badly; ellipses of corners far away will be too small" in grows
+    )
+    falls = remarks(rougher(scans, lambda ranges: 0.02 / ranges))
+    assert "falls with distance: one number fits badly; ellipses of corners nearby will be too small" in falls
+
+
+def test_words_say_that_something_moved():
+    scans = standing(SensorNoise(0.005, 0.001), 5)
+    moved = [replace(scan, ranges=scan.ranges + 0.0003 * i) for i, scan in enumerate(scans)]
+    assert "A wall drifted by more than the noise, by 1" in remarks(moved)
