@@ -1,6 +1,5 @@
 """The command `lidarcore evaluate`: what each method claims, and what is so."""
 
-import errno
 import os
 import time
 from collections.abc import Iterator
@@ -11,13 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli_options import RecordingPath, Set, SettingsFile, Topic, settings_from
+from app.cli_options import RecordingPath, Set, SettingsFile, Topic, check_folder, settings_from
 from app.cli_progress import ForPrograms, progress
 
 if TYPE_CHECKING:
     from lidarcore import SensorNoise
 
-WIDTH = 160  # of the tables in a file or a pipe
+WIDTH = 180  # of the tables in a file or a pipe
+MOVES = (
+    "The sensor moves in this recording: no corner can be judged. It should stand still in a room; "
+    "--skip and --scans choose a part in which it does."
+)
 
 evaluate = typer.Typer(help="What each method claims, and what is so.", no_args_is_help=True)
 
@@ -33,7 +36,14 @@ def consistency(
         typer.Option(metavar="RANGE,BEARING", help="sigmas in m and rad, e.g. 0.02,0.0034; may be repeated"),
     ] = None,
     segments: Annotated[str, typer.Option(help="known, found (by the real segmentation), or both")] = "both",
-    trials: Annotated[int, typer.Option(min=1, help="corner trials in all, each by every method")] = 100_000,
+    trials: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            help="corner trials in all, each by every method; "
+            "rounded up to whole blocks for each room, noise and segmentation",
+        ),
+    ] = 100_000,
     beams: Annotated[int, typer.Option(min=90, help="beams in a revolution")] = 920,
     seed: Annotated[int, typer.Option(min=0, help="of everything that is random")] = 0,
     workers: Annotated[
@@ -69,9 +79,9 @@ def consistency(
 
     if output is not None:  # told before minutes of work are lost
         consistency_tables.check(output, consistency_tables.STUDY_FORMATS)
-        _check_folder(output)
+        check_folder(output)
     if results is not None:
-        _check_folder(results)
+        check_folder(results, "--results")
     if segments not in (*SEGMENTATIONS, "both"):
         raise typer.BadParameter("--segments is known, found or both.")
     usual = monte_carlo.Design()
@@ -122,17 +132,20 @@ def repeatability(
 
     from app.repeatability_table import table
     from lidarcore import FITTERS, compare, open_recording
+    from lidarcore.errors import EvaluationError
     from lidarcore.evaluation import consistency_tables, repeatability_tables
     from lidarcore.evaluation.repeatability import Repeatability
 
     if output is not None:
         consistency_tables.check(output)
-        _check_folder(output)
+        check_folder(output)
     extraction = settings_from(settings, set_).extraction
     study = Repeatability(scans, [name.strip() for name in methods.split(",")] if methods else FITTERS)
     for scan in islice(open_recording(recording, topic), skip, skip + scans):
         study.add(compare(scan, extraction, study.methods))
     summary = study.summary()
+    if not any(method.corners for method in summary.methods):
+        raise EvaluationError(MOVES if study.moved else f"No corner can be judged. {summary.message}")
     console = Console()
     if not console.is_terminal:
         console = Console(width=WIDTH)
@@ -143,11 +156,6 @@ def repeatability(
         repeatability_tables.write(summary, output)
 
 
-def _check_folder(file: Path) -> None:
-    if file.is_dir() or not file.absolute().parent.is_dir():
-        raise FileNotFoundError(errno.ENOENT, "is no file in a folder that exists", str(file))
-
-
 def _noise(text: str) -> "SensorNoise":
     from lidarcore import SensorNoise
 
@@ -155,7 +163,7 @@ def _noise(text: str) -> "SensorNoise":
         sigma_range, sigma_bearing = map(float, text.split(","))
     except ValueError:
         raise typer.BadParameter(f"--noise {text!r} should be two numbers, m and rad: 0.02,0.0034.") from None
-    return SensorNoise(sigma_range, sigma_bearing)
+    return SensorNoise(sigma_range=sigma_range, sigma_bearing=sigma_bearing)
 
 
 @contextmanager

@@ -33,12 +33,13 @@ class LiveRepeatability:
     """
 
     def __init__(self) -> None:
-        self._spooler: Spooler[Frame] | None = None
+        self._spooler: Spooler[tuple[int, Frame]] | None = None
         self._running = False
         self._study = Repeatability()
         self._kind: _Kind | None = None
         self._last: Taken | None = None
         self._failing = False
+        self._begun = 0  # times it began anew; scans told of before that are dropped
         self._lock = threading.Lock()
 
     def tell(self, frame: Frame) -> None:
@@ -52,7 +53,7 @@ class LiveRepeatability:
         if self._spooler is None:
             self._spooler = Spooler(WAITING, self._attempt, _nothing, _nothing, logger.error)
             self._spooler.start()
-        self._spooler.put(frame)
+        self._spooler.put((self._begun, frame))
 
     def close(self) -> None:
         """End the thread."""
@@ -60,8 +61,9 @@ class LiveRepeatability:
             self._spooler.end()
 
     def clear(self) -> None:
-        """Begin anew."""
+        """Begin anew, without the scans that still wait."""
         with self._lock:
+            self._begun += 1
             self._study.clear()
             self._last = None
 
@@ -75,19 +77,22 @@ class LiveRepeatability:
         with self._lock:
             return self._study.deviations(corner)
 
-    def _attempt(self, frame: Frame) -> None:
+    def _attempt(self, told: tuple[int, Frame]) -> None:
         """One bad scan must not end it, nor may a thousand of them fill the log."""
+        begun, frame = told
         try:
-            self._add(frame)
+            self._add(begun, frame)
             self._failing = False
         except Exception:
             if not self._failing:
                 logger.exception("scan %s could not be compared", frame.taken.position)
             self._failing = True
 
-    def _add(self, frame: Frame) -> None:
+    def _add(self, begun: int, frame: Frame) -> None:
         kind = _kind(frame)
         with self._lock:
+            if begun != self._begun:
+                return
             if kind != self._kind:
                 self._study, self._kind, self._last = Repeatability(kind.window), kind, None
             elif _leaps(self._last, frame.taken):
@@ -97,7 +102,8 @@ class LiveRepeatability:
             self._last = frame.taken
         features = compare(frame.taken.scan, kind.extraction)
         with self._lock:
-            self._study.add(features)
+            if begun == self._begun:
+                self._study.add(features)
 
 
 def _kind(frame: Frame) -> _Kind:

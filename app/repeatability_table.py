@@ -2,6 +2,7 @@
 
 from rich.table import Table
 
+from app.consistency_table import COLOURS
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.evaluation.repeatability_summary import Box, Summary
 
@@ -19,16 +20,18 @@ def table(summary: Summary) -> Table:
         "corners", "claimed", "quartiles", "scatter", "claimed / scatter", "in 50 %", "in 95 %", "in 99 %",
     ):  # fmt: skip
         result.add_column(heading, justify="right")
+    result.add_column("ellipses are", no_wrap=True)
     for method in summary.methods:
         for kind, claim in method.claims.items():
             judged = claim.judgement
             result.add_row(
                 method.name,
-                f"[{'green' if claim.verdict == 'true' else 'red'}]{kind}[/]",
+                kind,
                 str(len(method.corners)),
                 *_box(claim.areas),
                 "" if method.actual_area is None else f"{MM2 * method.actual_area:.2f}",
                 *map(_cell, (judged.area_ratio, judged.coverage_50, judged.coverage_95, judged.coverage_99)),
+                "" if claim.verdict is None else f"[{COLOURS[claim.verdict]}]{claim.verdict}[/]",
             )
     return result
 

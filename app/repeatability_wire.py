@@ -5,7 +5,7 @@ from typing import Literal
 from typing_extensions import TypedDict
 
 from app.wire import Matrix, Pair
-from lidarcore.evaluation.repeatability_summary import Verdict
+from lidarcore.evaluation.consistency_figures import Verdict
 
 Kind = Literal["published", "consistent"]
 
@@ -40,7 +40,11 @@ class BoxJson(TypedDict):
 
 
 class ClaimJson(TypedDict):
-    """`areas` of the one-sigma ellipses, each scan's median over its corners; `verdict` on the 95 % ellipses."""
+    """`areas` of the one-sigma ellipses, each scan's median over its corners.
+
+    `verdict` on the ellipses of all corners: `open` while there are too few sightings to tell, null while no corner is
+    judged.
+    """
 
     areas: BoxJson | None
     judgement: JudgementJson

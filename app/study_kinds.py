@@ -78,7 +78,10 @@ class ConsistencyOptions(Options):
     """Of the study of consistency."""
 
     trials: int | None = Field(
-        None, ge=1000, le=20_000_000, description="corners simulated in all; as many as `quick` says if none"
+        None,
+        ge=1000,
+        le=20_000_000,
+        description="corners simulated in all, rounded up to whole blocks; as many as `quick` says if none",
     )
     noise: Noise = Field(
         "usual", description="usual runs through 1, 2, 3 and 5 cm; settings takes what is set now"

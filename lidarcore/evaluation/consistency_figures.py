@@ -15,7 +15,11 @@ Mask = NDArray[np.bool_]
 
 LEVELS = (0.50, 0.95, 0.99)
 GATES = -2 * np.log1p(-np.array(LEVELS))  # quantiles of chi-square with 2 degrees of freedom
-HONEST = (0.93, 0.97)  # coverage of a 95 % ellipse that can be believed
+Band = tuple[float, float]
+Wrong = Literal["too small", "too large"]
+Verdict = Literal["true", "too small", "too large", "open"]
+
+HONEST: Band = (0.93, 0.97)  # coverage of a 95 % ellipse that can be believed
 
 # Sums over trials, the columns of a block of results.
 SUMS = (
@@ -61,6 +65,18 @@ FIGURES: dict[str, Figure] = {
         Figure("area_ratio", "claimed / actual ellipse area", "", "claimed_area", "actual_area"),
     )
 }
+
+
+def wrong(coverage: Interval, honest: Band) -> Wrong | None:
+    """What ellipses are whose coverage surely lies outside a band: the whole interval does."""
+    if coverage.high < honest[0]:
+        return "too small"
+    return "too large" if coverage.low > honest[1] else None
+
+
+def within(coverage: Interval, band: Band) -> bool:
+    """Whether the coverage surely lies in a band: the whole interval does."""
+    return band[0] <= coverage.low and coverage.high <= band[1]
 
 
 def tally(trials: Trials) -> Array:

@@ -3,25 +3,23 @@
 import math
 from collections.abc import Sequence
 from itertools import groupby
-from typing import Literal
 
 from lidarcore.evaluation.consistency import Row
 from lidarcore.evaluation.consistency_design import KINDS
-from lidarcore.evaluation.consistency_figures import HONEST
+from lidarcore.evaluation.consistency_figures import HONEST, Verdict, within, wrong
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.lines import FITTERS
 
-Verdict = Literal["true", "too small", "too large", "open"]
+__all__ = ["Verdict", "sentences", "verdict"]
 
 
 def verdict(coverage_95: Interval) -> Verdict:
-    """Whether ellipses of this coverage can be believed; open if the interval reaches over an edge of HONEST."""
-    least, most = HONEST
-    if coverage_95.high < least:
-        return "too small"
-    if coverage_95.low > most:
-        return "too large"
-    return "true" if least <= coverage_95.low and coverage_95.high <= most else "open"
+    """Whether ellipses of this coverage can be believed; open if the interval reaches over an edge of HONEST.
+
+    A study has trials enough to show that a coverage lies within HONEST. A window of scans has not: there
+    `repeatability_summary.verdict` is content with a wider band, and asks the 50 % ellipses, too.
+    """
+    return wrong(coverage_95, HONEST) or ("true" if within(coverage_95, HONEST) else "open")
 
 
 def sentences(overall: Sequence[Row], by_room: Sequence[Row]) -> list[str]:

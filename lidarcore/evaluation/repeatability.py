@@ -84,6 +84,11 @@ class Repeatability:
         elif len(self._records) == self.window:
             self._moved = False
 
+    @property
+    def moved(self) -> bool:
+        """Whether the sensor moved and the window, which then began anew, is not full again."""
+        return self._moved
+
     def summary(self) -> Summary:
         """What the window says now."""
         found = scatter(self._sightings(), len(self._records))
@@ -130,7 +135,8 @@ class Repeatability:
     def _message(self, found: Scatter) -> str | None:
         scans = len(self._records)
         if self._moved:
-            return f"The sensor moved {scans} scans ago: the window began anew."
+            ago = f"{scans} scan{'s' * (scans > 1)} ago" if scans else "just now"
+            return f"The sensor moved {ago}: the window began anew."
         if scans < LEAST:
             return f"{scans} scans so far: a corner is judged from {LEAST} on."
         if not (found.counts >= LEAST).any():
@@ -166,8 +172,7 @@ def _method(name: str, m: int, found: Scatter, areas: Array) -> Method:
     actual = float(np.median([corner.area for corner in corners])) if corners else None
     judged = [found.judgement(m, k) for k in range(len(KINDS))]
     claims: dict[str, Claim] = {
-        kind: Claim(_box(areas[:, k]), judged[k], verdict(judged[k].coverage_95))
-        for k, kind in enumerate(KINDS)
+        kind: Claim(_box(areas[:, k]), judged[k], verdict(judged[k])) for k, kind in enumerate(KINDS)
     }
     return Method(name, actual, claims, corners)
 

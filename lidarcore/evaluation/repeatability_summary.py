@@ -1,14 +1,14 @@
 """What repeatability is told as: plain figures, in m and m², that `dataclasses.asdict` makes ready for JSON."""
 
 from dataclasses import dataclass
-from typing import Literal
 
-from lidarcore.evaluation.consistency_figures import HONEST
+from lidarcore.evaluation.consistency_figures import HONEST, Band, Verdict, within, wrong
 from lidarcore.evaluation.intervals import Interval
 
 WHISKER = 1.5  # times the distance between the quartiles
+HONEST_50: Band = (0.45, 0.55)  # coverage of a 50 % ellipse that may be true
+BELIEVED: Band = (0.90, 0.985)  # of a 95 % ellipse; HONEST is narrower than what a window can show
 
-Verdict = Literal["too small", "true", "too large"]
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
 
@@ -23,13 +23,17 @@ class Judgement:
     coverage_99: Interval
 
 
-def verdict(coverage: Interval) -> Verdict | None:
-    """Of ellipses that should hold 95 %: wrong if the whole interval says so; None where nothing is known."""
-    if coverage.high < HONEST[0]:
-        return "too small"
-    if coverage.low > HONEST[1]:
-        return "too large"
-    return "true" if coverage.value == coverage.value else None
+def verdict(judgement: Judgement) -> Verdict | None:
+    """Wrong if the 95 % ellipses surely are, or those of 50 %; true if those of 95 % surely are near it; else open.
+
+    With few sightings only the 50 % ellipses can tell that ellipses are too large: those of 95 % miss 5 in 100 at best.
+    None where nothing is known. A study's `consistency_verdicts.verdict` asks for more, as it has more trials.
+    """
+    held = judgement.coverage_95
+    if held.value != held.value:
+        return None
+    found = wrong(held, HONEST) or wrong(judgement.coverage_50, HONEST_50)
+    return found or ("true" if within(held, BELIEVED) else "open")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +81,7 @@ class Claim:
     """What one method says by one kind of covariance, and whether it is so.
 
     areas     of the one-sigma ellipses, each scan's median over its corners; None while no corner was found
-    verdict   on the 95 % ellipses of all corners together; None while no corner is judged
+    verdict   on the ellipses of all corners together; open: too few sightings to tell; None: no corner is judged
     """
 
     areas: Box | None

@@ -2,6 +2,7 @@
 
 import { KINDS } from "./boxes.js";
 import { $, el, setText, swatch } from "./dom.js";
+import { showPanel } from "./tabs.js";
 import { fixed, UNKNOWN } from "./units.js";
 
 const FIGURES = [
@@ -15,7 +16,10 @@ const MEANING = {
   "too small": "they are too small, and claim to know more than they do",
   true: "that is true, they can be believed",
   "too large": "they are too large, and claim to know less than they do",
+  open: "too few sightings to tell whether that is true",
 };
+
+const NOISE = { "too small": "more", "too large": "less" };
 
 /** The table, with its head. */
 export function claimTable() {
@@ -44,7 +48,21 @@ export function drawClaims(methods, { fitter, covariance }) {
   const used = methods.find(({ name }) => name === fitter)?.claims[covariance];
   setText($("repeatability-verdict"), used ? sentence(fitter, covariance, used) : "");
   $("repeatability-verdict").dataset.verdict = used?.verdict ?? "";
-  setText($("repeatability-hint"), hint(methods));
+  drawHint(wrongForAll(methods));
+}
+
+/** What to do if all are wrong: it stands above the table, whose words then say little. */
+export function calibrateHint() {
+  const onclick = () => {
+    showPanel("setup", { focus: true });
+    $("calibration").scrollIntoView({ block: "start" });
+  };
+  return el(
+    "div",
+    { id: "repeatability-hint", class: "notice", hidden: true },
+    el("p"),
+    el("button", { type: "button", onclick }, "Calibrate"),
+  );
 }
 
 function bodyOf({ name, claims }) {
@@ -72,15 +90,27 @@ function cellOf({ value, low, high }, { factor, digits }) {
 
 function sentence(fitter, covariance, { judgement, verdict }) {
   if (!verdict) return "";
-  const held = fixed(100 * judgement.coverage_95.value, 0);
-  return `The ${covariance} 95\u2009% ellipses of ${fitter} hold ${held}\u2009% of the scatter: ${MEANING[verdict]}.`;
+  const [half, most] = ["coverage_50", "coverage_95"].map((key) => fixed(100 * judgement[key].value, 0));
+  return (
+    `The ${covariance} 95\u2009% ellipses of ${fitter} hold ${most}\u2009% of the scatter, ` +
+    `and those of 50\u2009% hold ${half}\u2009%: ${MEANING[verdict]}.`
+  );
 }
 
-/** If even the exact covariances are wrong for all methods, it is the noise they are told. */
-function hint(methods) {
-  const verdicts = new Set(methods.map(({ claims }) => claims.consistent.verdict));
-  const [verdict] = verdicts;
-  if (verdicts.size > 1 || !(verdict in MEANING) || verdict === "true") return "";
-  const noise = verdict === "too large" ? "less" : "more";
-  return `Wrong by the same sign for all, even where the formula is exact: the sensor has ${noise} noise than Setup says.`;
+/** How even the exact covariances are wrong for all methods, if they are: it is the noise they are told. */
+function wrongForAll(methods) {
+  const [verdict, ...others] = new Set(methods.map(({ claims }) => claims.consistent.verdict));
+  return others.length === 0 && NOISE[verdict] ? verdict : null;
+}
+
+function drawHint(verdict) {
+  const hint = $("repeatability-hint");
+  hint.hidden = !verdict;
+  $("repeatability-claims").classList.toggle("doubted", Boolean(verdict));
+  if (!verdict) return;
+  setText(
+    hint.firstElementChild,
+    `The consistent ellipses of all methods are ${verdict}: the sensor has ${NOISE[verdict]} noise than Setup says. ` +
+      "Calibrate first (in Setup); until then the words below say little.",
+  );
 }

@@ -3,7 +3,7 @@
 import { request } from "./api.js";
 import { switchRow } from "./bindings.js";
 import { boxPlot, drawBoxes } from "./boxes.js";
-import { claimTable, drawClaims } from "./claims.js";
+import { calibrateHint, claimTable, drawClaims } from "./claims.js";
 import { $, el, setText, swatch } from "./dom.js";
 import { paced } from "./pace.js";
 import { parameterRow } from "./parameters.js";
@@ -61,15 +61,15 @@ function make(fields) {
       title("areas-title", "Claimed ellipse areas, mm²"),
       legend({ box: true, last: sign("actual", "area of the scatter") }),
       boxPlot(),
-      el("p", { class: "muted" }, "1σ; each scan's median over its corners. A box left of the line claims more than is so, one to its right less."),
+      el("p", { class: "muted" }, "1σ; each scan's median over its corners. A box left of the line claims more than is so, one to its right less. Where a few corners are disturbed, the table decides: line and boxes are medians of different things."),
     ),
     el(
       "section",
       { id: "repeatability-claims", "aria-labelledby": "claims-title", hidden: true },
       title("claims-title", "Claim and scatter"),
+      calibrateHint(),
       el("p", { id: "repeatability-verdict" }),
       el("div", { class: "table-scroll", tabIndex: -1 }, claimTable()),
-      el("p", { id: "repeatability-hint", class: "muted" }),
       el("p", { class: "muted" }, "First the sum of the areas, where large ellipses of far corners weigh most; then how much of the scatter, in %, the ellipses of 50, 95 and 99 % hold. Below each its 95 % confidence interval."),
     ),
     el(

@@ -49,7 +49,10 @@ function study(kind, refresh) {
     event.preventDefault();
     start(kind, chosen(form, fields), refresh);
   });
-  form.addEventListener("change", () => showTopic(form));
+  form.addEventListener("change", ({ target }) => {
+    if (target.name === "recording") suitNoise(form);
+    showTopic(form);
+  });
   showTopic(form);
   return el(
     "section",
@@ -144,6 +147,11 @@ function group(legend, choices) {
 function choice(name, value, checked, words) {
   const radio = el("input", { type: "radio", name, value, checked, class: "visually-hidden" });
   return el("label", {}, radio, el("span", {}, ...words));
+}
+
+/** A recording has its sensor's noise, simulated rooms the papers'. */
+function suitNoise({ elements: { noise, recording } }) {
+  noise.value = recording.value ? "settings" : "usual";
 }
 
 /** A topic is of a recording. */

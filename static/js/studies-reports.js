@@ -1,4 +1,5 @@
-// Finished reports: a list, and the one chosen, which the address keeps. A report that is just finished is shown.
+// Finished reports: a list, and the one chosen, which the address keeps. A report that is just finished is shown;
+// on a wide page the newest one is while none is chosen.
 
 import { address, request } from "./api.js";
 import { $, el, iconButton, remake, setText } from "./dom.js";
@@ -6,13 +7,16 @@ import { get, on, set } from "./store.js";
 import { QUESTION_MS, report as tell, toast } from "./toasts.js";
 import { bytes, duration, fineDegrees, millimetres, moment } from "./units.js";
 
+const wide = matchMedia("(min-width: 900px)");
+
 let watched = false; // whether a study ran while the page was open
 
 /** `refresh` is called when a report was deleted. */
 export function mountReports(refresh) {
   on(["studies"], showFinished);
   on(["studies", "hash"], ({ reports, folder }, hash) => {
-    const chosen = reports.find(({ name }) => hash === hashOf(name));
+    const newest = wide.matches ? reports[0] : undefined;
+    const chosen = reports.find(({ name }) => hash === hashOf(name)) ?? newest;
     setText($("report-count"), reports.length || "");
     setText($("report-folder"), reports.length ? `Files in ${folder}` : "");
     $("report-none").hidden = reports.length > 0;
@@ -22,6 +26,7 @@ export function mountReports(refresh) {
   on(["settings"], dress);
   $("report").addEventListener("load", dress);
   window.addEventListener("hashchange", keepHash);
+  wide.addEventListener("change", keepHash);
   keepHash();
 }
 
@@ -84,7 +89,7 @@ function confirmDelete({ name, kind }, refresh) {
     }
     await refresh();
   };
-  toast(`${titleOf(kind)}, ${name}, will be deleted from the server.`, {
+  toast(`\u201c${titleOf(kind)}\u201d (${name}) will be deleted from the server.`, {
     title: "Delete this report?",
     action: { label: "Delete", run },
     linger: QUESTION_MS,

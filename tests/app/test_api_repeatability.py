@@ -115,7 +115,7 @@ def test_the_dots_of_a_corner_scatter_as_the_summary_says(standing: Server) -> N
             assert dots["id"] == corner["id"]
             xy = np.array(dots["deviations"][method["name"]])
             assert len(xy) == corner["count"]
-            np.testing.assert_allclose(xy.mean(0), 0, atol=1e-15)
+            np.testing.assert_allclose(xy.mean(0), 0, atol=1e-12)  # m, of sums of metres
             np.testing.assert_allclose(np.cov(xy.T), corner["scatter"])
     problem = assert_problem(standing.http.get("/repeatability/corners/99999"), 404)
     assert "99999" in problem["detail"]
@@ -286,6 +286,19 @@ def test_a_scan_that_cannot_be_worked_on_does_not_end_it(
     told(room, frames[:2], 2)
     told(room, [broken(frames[2]), broken(frames[3]), frames[4]], 3)
     assert caplog.text.count("could not be compared") == 1
+
+
+def test_scans_that_wait_while_it_is_begun_anew_are_dropped(
+    room: LiveRepeatability, frames: list[Frame]
+) -> None:
+    """Only the one told of afterwards is in the window; its boxes are those of that scan alone."""
+    for frame in frames[:-1]:
+        room.tell(frame)
+    room.clear()
+    room.tell(frames[-1])
+    alone = Repeatability()
+    alone.add(compare(frames[-1].taken.scan, frames[-1].settings.extraction))
+    wait_until(lambda: room.summary() == alone.summary(), "the last scan alone is in the window")
 
 
 def test_scans_left_out_on_the_way_are_no_leap_but_a_seek_is(

@@ -14,7 +14,15 @@ from waiting import wait_until
 
 KINDS = ("consistent", "published")
 FIGURES = {"area_ratio": (1, 2), "coverage_50": (100, 0), "coverage_95": (100, 1), "coverage_99": (100, 1)}
-SIGNS = {"too small": "too small", "true": "can be believed", "too large": "too large"}
+LINES = (
+    "node => { const all = new Range(); all.selectNodeContents(node); return all.getClientRects().length; }"
+)
+SIGNS = {
+    "too small": "too small",
+    "true": "can be believed",
+    "too large": "too large",
+    "open": "too few sightings",
+}
 
 
 def found(server: Server) -> dict[str, Any]:
@@ -96,12 +104,50 @@ def test_table_and_sentence_say_what_the_server_says(tab: Visitor) -> None:
     for kind in KINDS:
         tab.server.patch("settings", {"extraction": {"covariance": kind}})
         claim = next(method for method in told["methods"] if method["name"] == "ml")["claims"][kind]
-        held = text(claim["judgement"]["coverage_95"]["value"], 100, 0)
+        most, half = (text(claim["judgement"][f"coverage_{n}"]["value"], 100, 0) for n in (95, 50))
         sentence = page.locator("#repeatability-verdict")
         expect(sentence).to_contain_text(f"The {kind} 95")
         expect(sentence).to_contain_text(
-            re.compile(rf"of ml hold {held}.% of the scatter: .*{SIGNS[claim['verdict']]}")
+            re.compile(
+                rf"of ml hold {most}.% of the scatter, and those of 50.% hold {half}.%: .*{SIGNS[claim['verdict']]}"
+            )
         )
+
+
+def set_noise(visitor: Visitor, sigma_range: float, sigma_bearing: float) -> None:
+    noise = {"sigma_range": sigma_range, "sigma_bearing": sigma_bearing}
+    visitor.server.patch("settings", {"extraction": {"noise": noise}})
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "verdict", "noise"),
+    [((0.05, 0.01), "too large", "less"), ((0.001, 0.0001), "too small", "more")],
+)
+def test_where_all_are_wrong_the_way_to_calibration_stands_above_the_table(
+    tab: Visitor, sigmas: tuple[float, float], verdict: str, noise: str
+) -> None:
+    page = tab.page
+    set_noise(tab, *sigmas)
+    hint = page.locator("#repeatability-hint")
+    expect(hint).to_contain_text(
+        f"of all methods are {verdict}: the sensor has {noise} noise than Setup says"
+    )
+    expect(page.locator("#repeatability-hint ~ * #repeatability-table")).to_be_attached()
+    words = page.locator("#repeatability-table td.verdict")
+    muted = page.locator("#repeatability-areas p.muted").evaluate("node => getComputedStyle(node).color")
+    expect(words.first).to_have_css("color", muted)
+    hint.get_by_role("button", name="Calibrate").click()
+    expect(page.get_by_role("tab", name="Setup")).to_have_attribute("aria-selected", "true")
+    expect(page.get_by_role("heading", name="Calibration")).to_be_in_viewport()
+    set_noise(tab, 0.01, 0.001)  # what the emulator has, nearly
+    page.get_by_role("tab", name="Repeatability").click()
+    expect(hint).to_be_hidden()
+
+
+def test_no_head_of_the_table_breaks_within_a_percentage(tab: Visitor) -> None:
+    still(tab)
+    for head in tab.page.locator("#repeatability-table th", has_text="in ").all():
+        assert head.evaluate(LINES) == 1
 
 
 def test_boxes_stand_where_the_areas_are_on_a_logarithmic_axis(tab: Visitor) -> None:

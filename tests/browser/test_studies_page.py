@@ -72,7 +72,16 @@ def test_a_study_is_run_and_its_report_read_in_the_page(studies: Callable[..., V
     assert download.value.suggested_filename == f"{name}.html"
     page.reload()
     expect(page.frame_locator("#report").get_by_role("heading", name="How this was made")).to_be_attached()
+    page.goto(f"{visitor.server.url}/studies")  # where none is chosen, the newest is shown
+    expect(page.locator("#viewer-title")).to_have_text("Which ellipses can be believed?")
+    page.set_viewport_size({"width": 390, "height": 844})
+    expect(page.locator("#viewer")).to_be_hidden()
+    page.set_viewport_size({"width": 1400, "height": 900})
+    expect(page.frame_locator("#report").get_by_role("heading", name="How this was made")).to_be_attached()
     page.get_by_role("button", name=f"Delete {name}").click()
+    expect(page.locator("#toasts")).to_contain_text(
+        f"“Which ellipses can be believed?” ({name}) will be deleted from the server."
+    )
     page.get_by_role("button", name="Delete", exact=True).click()
     expect(page.get_by_text("None yet: run a study.")).to_be_visible()
     expect(page.locator("#viewer")).to_be_hidden()
@@ -101,6 +110,33 @@ def test_what_went_wrong_is_said_in_the_words_of_the_command(studies: Callable[.
     form.get_by_label("Topic").fill("/none")
     form.get_by_role("button", name="Run").click()
     expect(visitor.page.locator("#run-state")).to_have_text(re.compile("^Failed after .*/none"), timeout=LONG)
+
+
+def test_a_recording_is_told_the_noise_set_now_and_the_rooms_the_papers(
+    studies: Callable[..., Visitor],
+) -> None:
+    form = study(studies().page, "Conditional weighted linear fitting")
+    form.get_by_text("Options").click()
+    usual, now = (form.get_by_role("radio", name=re.compile(name)) for name in ("^Usual", "^As set now"))
+    expect(usual).to_be_checked()
+    form.get_by_label("Recording").select_option("emulated-s1.mcap")
+    expect(now).to_be_checked()
+    form.get_by_text("Usual").click()
+    form.get_by_label("Scans").fill("20")
+    expect(usual).to_be_checked()  # what was chosen by hand stays
+    form.get_by_label("Recording").select_option("")
+    expect(usual).to_be_checked()
+
+
+def test_the_main_table_of_a_report_fits_beside_the_studies(
+    studies: Callable[..., Visitor],
+) -> None:
+    """With four noises, one beside the other: nothing is cut off."""
+    visitor = studies(1400, 900)
+    visitor.server.api.post("studies/consistency", json={"trials": 1000}).raise_for_status()
+    table = visitor.page.frame_locator("#report").locator("table").first
+    expect(table.get_by_role("columnheader")).to_have_count(6, timeout=LONG)
+    assert table.evaluate("node => node.parentNode.scrollWidth <= node.parentNode.clientWidth")
 
 
 def test_the_keyboard_alone_starts_and_cancels(studies: Callable[..., Visitor]) -> None:

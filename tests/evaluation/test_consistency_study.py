@@ -202,6 +202,8 @@ def test_the_command_prints_a_table_and_writes_the_file(tmp_path):
         (["--room", "kitchen"], f"choose one of {', '.join(ROOMS)}"),
         (["--noise", "0.02"], "two numbers"),
         (["--noise", "0.02,-1"], "greater than 0"),
+        (["--noise", "nan,0.001"], "sigma_range: Input should be a finite number"),
+        (["--noise", "0.02,inf"], "sigma_bearing: Input should be a finite number"),
         (["--segments", "some"], "known, found or both"),
         (["-o", "out.txt"], "should end in"),
         (["-o", "nowhere/out.csv"], "nowhere/out.csv"),

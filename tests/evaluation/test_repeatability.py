@@ -2,6 +2,8 @@
 
 import csv
 import json
+import math
+from collections import Counter
 from dataclasses import asdict, replace
 from itertools import islice
 
@@ -14,8 +16,11 @@ from app.cli import cli
 from lidarcore import ExtractionSettings, Features, Scan, SensorNoise, compare, open_recording
 from lidarcore import tables as columns
 from lidarcore.errors import EvaluationError
+from lidarcore.evaluation.intervals import Interval
 from lidarcore.evaluation.repeatability import Repeatability
+from lidarcore.evaluation.repeatability_summary import Judgement, verdict
 from lidarcore.evaluation.repeatability_tables import to_csv, to_json
+from lidarcore.evaluation.scatter import SIGHTING, Sightings, scatter
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
@@ -94,6 +99,57 @@ def test_a_claim_halved_or_doubled_is_caught_with_its_figure(factor):
         claimed = corner.claims["consistent"]
         np.testing.assert_allclose(claimed.covariance, factor * COVARIANCE)
         assert claimed.area == pytest.approx(np.pi * factor * np.sqrt(np.linalg.det(COVARIANCE)))
+
+
+def verdicts(corners, claim, studies, seed=0):
+    """Shares of the verdicts on ellipses `claim` times the true covariance (2, 2), of corners seen in 100 scans."""
+    rng, scans = np.random.default_rng(seed), 100
+    table = np.zeros((corners * scans, studies, SIGHTING))
+    table[..., :2] = rng.normal(size=(corners * scans, studies, 2))
+    table[..., 2:6] = table[..., 6:] = np.ravel(claim)
+    ids, at = np.repeat(np.arange(corners), scans), np.tile(np.arange(scans), corners)
+    found = scatter(Sightings(ids, at, table), scans)
+    words = Counter(verdict(found.judgement(m, 0)) for m in range(studies))
+    return {word: words[word] / studies for word in ("true", "too small", "too large", "open")}
+
+
+@pytest.mark.parametrize(("corners", "believed"), [(1, 0.1), (5, 0.95), (10, 0.99)])
+def test_honest_ellipses_are_hardly_ever_called_wrong_and_believed_once_enough_is_seen(corners, believed):
+    """Of one corner's hundred scans it is mostly open."""
+    told = verdicts(corners, np.eye(2), 3000)
+    assert max(told["too small"], told["too large"]) <= 0.006, told
+    assert told["true"] >= believed, told
+
+
+@pytest.mark.parametrize("corners", [1, 3, 10])
+@pytest.mark.parametrize(("sigmas", "word"), [(1 / 1.5, "too small"), (1.5, "too large"), (7.6, "too large")])
+def test_ellipses_wrong_by_half_a_sigma_are_caught_even_of_one_corner(corners, sigmas, word):
+    """7.6 sigmas are 58 times the area, of which the 95 % ellipses alone say nothing: they hold all of 100 scans."""
+    told = verdicts(corners, sigmas**2 * np.eye(2), 1000)
+    assert told[word] >= 0.99, told
+    assert told["true"] == 0
+
+
+def test_ellipses_of_a_wrong_shape_are_not_true_though_they_hold_95_in_100():
+    """Far too wide in one direction, a little too narrow in the other."""
+    shape = np.diag([100.0, 1.0]) * stats.norm.ppf(0.975) ** 2 / stats.chi2(2).ppf(0.95)
+    told = verdicts(10, shape, 300)
+    assert told["too large"] > 0.95, told
+
+
+@pytest.mark.parametrize(
+    ("in_95", "in_50", "word"),
+    [
+        ((0.93, 0.97), (0.46, 0.54), "true"), ((0.90, 0.985), (0.40, 0.60), "true"),
+        ((0.89, 0.97), (0.46, 0.54), "open"), ((0.94, 0.99), (0.46, 0.54), "open"),
+        ((0.93, 0.97), (0.56, 0.70), "too large"), ((0.93, 0.97), (0.30, 0.44), "too small"),
+        ((0.80, 0.92), (0.60, 0.70), "too small"), ((0.98, 1.00), (0.46, 0.54), "too large"),
+        ((math.nan, math.nan), (math.nan, math.nan), None),
+    ],
+)  # fmt: skip
+def test_whole_intervals_decide_those_of_95_percent_before_those_of_50(in_95, in_50, word):
+    half, most = (Interval((low + high) / 2, low, high) for low, high in (in_50, in_95))
+    assert verdict(Judgement(half, half, most, most)) == word
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
@@ -199,7 +255,8 @@ def test_a_sensor_that_is_pushed_is_noticed_and_the_window_begins_anew(step):
     assert not any(said[10:60])
     assert "9 scans so far" in said[8]
     first = next(i for i, message in enumerate(said) if "moved" in message)
-    print(first)
+    assert "moved just now" in said[first]
+    assert not any("moved 0" in message for message in said)
     assert first < 60 + 40
     if step > 0.01:
         assert study.summary().scans == 160 - first - 1
@@ -302,6 +359,53 @@ def test_the_command_tells_and_writes_what_the_library_finds(data, tmp_path, suf
             (name, kind) for name in ("ml", "cwlf") for kind in ("published", "consistent")
         ]
         assert float(rows[1]["coverage_95"]) == of(study).coverage_95.value
+
+
+@pytest.fixture
+def recorded(tmp_path):
+    """Makes a file of a simulated sensor's scans."""
+
+    def make(scans, **settings):
+        path, taken = tmp_path / "simulated.npz", standing(scans, **settings)
+        ranges = [scan.ranges for scan in taken]
+        bearings = [scan.bearings for scan in taken]
+        with path.open("wb") as file:
+            np.savez(file, ranges=ranges, bearings=bearings, stamps=0.1 * np.arange(scans))
+        return str(path)
+
+    return make
+
+
+def command(*arguments):
+    return CliRunner().invoke(cli, ["evaluate", "repeatability", *arguments])
+
+
+@pytest.mark.parametrize(
+    ("scans", "settings", "extra", "said"),
+    [
+        (20, {"path": "figure of eight"}, [], "The sensor moves in this recording"),
+        (8, {}, [], "8 scans so far: a corner is judged from 10 on"),
+        (12, {}, ["--skip", "12"], "0 scans so far"),
+        (12, {}, ["--set", "min_points=400"], "No corner was seen in 10 of the last 12 scans"),
+    ],
+)
+def test_the_command_says_why_if_no_corner_can_be_judged_and_writes_nothing(
+    recorded, tmp_path, scans, settings, extra, said
+):
+    output = tmp_path / "out.json"
+    result = command(recorded(scans, **settings), "--methods", METHOD, "-o", str(output), *extra)
+    assert isinstance(result.exception, EvaluationError)
+    assert said in str(result.exception)
+    assert not output.exists()
+
+
+def test_the_command_tells_the_verdict_in_words(recorded):
+    path = recorded(30)
+    for sigma, word in ((0.05, "too large"), (0.002, "too small")):
+        result = command(path, "--methods", METHOD, "--set", f"noise.sigma_range={sigma}")
+        assert result.exit_code == 0, result.output
+        assert "ellipses are" in result.output
+        assert result.output.count(word) == 2
 
 
 def test_the_command_refuses_a_file_of_another_kind_before_it_works(tmp_path):
