@@ -1,6 +1,7 @@
 """Does the sensor stand still? Seen from its corners alone, whatever their covariances claim."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarcore.evaluation.scatter import LEAST, Sightings
 from lidarcore.scan import Array, Ints
@@ -12,29 +13,31 @@ _SIGMAS = 6.0
 
 def moves(corners: Sightings, xy: Array, newest: int) -> bool:
     """Whether corners at xy (R, 2) m tell of a sensor that moves; `newest` is the number of the last scan."""
-    return _leapt(corners, newest) or _drifts(corners, xy)
+    first = corners.scans[corners.starts]
+    last = corners.scans[np.append(corners.starts[1:], len(corners.ids)) - 1] if len(first) else first
+    stay = (3 * first <= newest) & (3 * last >= 2 * newest)
+    return _leapt(first, last, newest) or _drifts(corners, xy, stay)
 
 
-def _leapt(corners: Sightings, newest: int) -> bool:
+def _leapt(first: Ints, last: Ints, newest: int) -> bool:
     """Nearly all corners of the last scans were never seen before. Corners that are hidden do not count."""
     if newest < LEAST:
         return False
-    first = corners.scans[corners.starts]
-    last = corners.scans[np.append(corners.starts[1:], len(corners.ids)) - 1] if len(first) else first
     recent = last > newest - RECENT
     new = recent & (first > newest - RECENT)
     return bool(recent.sum() >= RECENT and new.sum() > _NEW * recent.sum())
 
 
-def _drifts(corners: Sightings, xy: Array) -> bool:
-    """Most corners lie elsewhere in their last third of sightings than in the first: by _SIGMAS standard errors.
+def _drifts(corners: Sightings, xy: Array, stay: NDArray[np.bool_]) -> bool:
+    """Most corners that stay in view lie elsewhere in their last third of sightings than in the first.
 
+    By _SIGMAS standard errors. Corners that came or went in the middle of the window have nothing to tell of it.
     The noise is taken from successive differences, which a slow drift hardly enters. Real sensors' errors are
     correlated from scan to scan (0.3 in real recordings), so the limit is wider than chance alone would ask for.
     """
     starts = corners.starts
     n = np.diff(starts, append=len(corners.ids))
-    often: Ints = np.flatnonzero(n >= LEAST)
+    often: Ints = np.flatnonzero(stay & (n >= LEAST))
     if not len(often):
         return False
     third, rank = np.repeat(n // 3, n), np.arange(len(xy)) - np.repeat(starts, n)

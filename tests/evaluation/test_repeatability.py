@@ -325,7 +325,8 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing():
 
 @pytest.mark.real_data
 def test_of_a_real_sensor_moved_from_station_to_station_each_move_is_noticed(data):
-    """401 revolutions at a station."""
+    """401 revolutions at a station. The third move, of 0.2 m, one of two corners survives: that shows as a drift only,
+    after a third of the window."""
     study, moved, before = Repeatability(methods=[METHOD]), [], 0
     for i, scan in enumerate(
         islice(open_recording(data / "rplidar_csv_rooms" / "mapping_keng.csv.gz"), 1250)
@@ -335,7 +336,8 @@ def test_of_a_real_sensor_moved_from_station_to_station_each_move_is_noticed(dat
             moved.append(i)
         before = len(study)
     assert [int(i // 401) for i in moved] == [1, 2, 3], moved
-    assert all(i % 401 < 20 for i in moved), moved
+    assert all(i % 401 < 20 for i in moved[:2]), moved
+    assert moved[2] % 401 < 40, moved
 
 
 @pytest.mark.real_data
