@@ -1,5 +1,7 @@
 # `make run` and `make test` are all a newcomer needs; both set up what they use, from the lock files.
 SHELL := /bin/bash
+# Tests start processes by the dozen; without it each would compile all modules anew.
+unexport PYTHONDONTWRITEBYTECODE
 PYTHON ?= python3
 SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 HOST ?= 127.0.0.1
@@ -7,14 +9,25 @@ PORT ?= 8000
 RECORDING ?=
 bin := .venv/bin
 
-.PHONY: run test lint bench demo guide lock clean
+.PHONY: run test coverage mutants lint bench demo guide docs screenshots lock clean
 
 run: .venv/.run
 	$(bin)/lidarcore serve --host $(HOST) --http-port $(PORT) $(if $(RECORDING),"$(RECORDING)")
 
 test: .venv/.dev lint
-	@command -v chromium >/dev/null || { $(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends chromium fonts-dejavu-core; }
-	$(bin)/python -m pytest
+	@$(browser)
+	$(parallel)
+
+coverage: .venv/.dev
+	@$(browser)
+	$(parallel) --cov --cov-report=term:skip-covered
+
+# Whether the tests notice the seeded faults; in about half an hour.
+mutants: .venv/.dev
+	$(bin)/python tests/mutants/run.py
+
+parallel := $(bin)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --durations=15
+browser := command -v chromium-headless-shell >/dev/null || { $(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends chromium-headless-shell fonts-dejavu-core; }
 
 lint: .venv/.dev
 	$(bin)/ruff check .
@@ -26,7 +39,17 @@ bench: .venv/.run
 
 # The page that explains the ellipses, measured and drawn anew; in a minute or two.
 guide: .venv/.run
-	$(bin)/python -m lidarcore.guide static/guide.html
+	$(bin)/python -m docs.guide static/guide.html
+
+# The documentation, into docs/_build/html; the server shows it at /documentation/.
+docs: .venv/.dev
+	$(bin)/python -m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env --doctree-dir docs/_build/doctrees docs docs/_build/html
+	@echo "Built: docs/_build/html/index.html"
+
+# The pictures in the documentation, taken anew of an emulated sensor; in a minute or two.
+screenshots: .venv/.dev
+	@$(browser)
+	$(bin)/python docs/screenshots.py docs/images
 
 # What the wheel ships as a demo: an emulated sensor that moves, recorded as a real one would be.
 demo: .venv/.run
@@ -39,7 +62,8 @@ demo: .venv/.run
 
 .venv/.run: requirements.lock pyproject.toml | .venv/bin/python
 	$(bin)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
-	$(bin)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@# setuptools warns of folders named like ours; they are ours
+	PYTHONWARNINGS=ignore $(bin)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
 .venv/.dev: requirements-dev.lock .venv/.run
@@ -50,7 +74,7 @@ demo: .venv/.run
 compile := uv pip compile --quiet --universal --generate-hashes --no-header --no-emit-index-url --no-annotate pyproject.toml
 lock:
 	$(compile) --group build -o requirements.lock
-	$(compile) --group build --group dev -c requirements.lock -o requirements-dev.lock
+	$(compile) --group build --group dev --group docs -c requirements.lock -o requirements-dev.lock
 
 clean:
-	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist
+	rm -rf .venv .pytest_cache .mypy_cache .ruff_cache .hypothesis build dist docs/_build

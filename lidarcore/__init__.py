@@ -5,6 +5,7 @@ Metres, radians, seconds; x forward, y left, angles counter-clockwise (REP-103).
 
 from typing import TYPE_CHECKING, Any
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.errors import (
     DegenerateLineError,
     DeviceError,
@@ -19,19 +20,25 @@ from lidarcore.lines import FITTERS, Line, Lines
 from lidarcore.noise import SensorNoise
 from lidarcore.recordings import open_recording
 from lidarcore.scan import Scan
+from lidarcore.sensors import SENSORS, SensorKind
 from lidarcore.settings import ExtractionSettings
+from lidarcore.tracking import CornerRow, Tracker
 
 if TYPE_CHECKING:
     from lidarcore.client import Client
 
 __all__ = [
     "FITTERS",
+    "SENSORS",
+    "Array",
     "Client",
+    "CornerRow",
     "Corners",
     "DegenerateLineError",
     "DeviceError",
     "ExtractionSettings",
     "Features",
+    "Ints",
     "LidarError",
     "Line",
     "Lines",
@@ -40,10 +47,15 @@ __all__ = [
     "Scan",
     "ScanError",
     "Segments",
+    "SensorKind",
     "SensorNoise",
     "TopicError",
+    "Tracker",
     "compare",
+    "errors",
     "extract",
+    "files",
+    "noise",
     "open_recording",
     "warm_up",
 ]

@@ -6,6 +6,7 @@ from lidarcore.compiled import inlined
 from lidarcore.scan import Array
 from lidarcore.tables import (
     CORNER_CONSISTENT,
+    CORNER_MAP,
     CORNER_PUBLISHED,
     DISTANCE,
     END,
@@ -13,6 +14,7 @@ from lidarcore.tables import (
     FIRST_BEAM,
     LAST_BEAM,
     LINE_CONSISTENT,
+    LINE_MAP,
     LINE_PUBLISHED,
     NORMAL,
     SEGMENTS,
@@ -80,9 +82,9 @@ def _distance(corner: Array, segment: Array, end: int) -> float:
 
 @inlined
 def intersect(first: Array, second: Array, out: Array) -> None:
-    """Intersect two lines given as rows unit normal (2), r, published (4), consistent (4).
+    """Intersect two lines given as rows unit normal (2), r, published (4), consistent (4), for maps (4).
 
-    Writes x, y and both covariances (10 numbers) to out. One code path for every fitter: to first order
+    Writes x, y and the three covariances (CORNER_FIELDS numbers) to out. One code path for every fitter: to first order
     the result does not depend on the parameters a line was fitted in.
     """
     cj, sj, ck, sk = first[NORMAL], first[NORMAL + 1], second[NORMAL], second[NORMAL + 1]
@@ -92,7 +94,11 @@ def intersect(first: Array, second: Array, out: Array) -> None:
     out[0], out[1] = x, y
     # n_j . p = r_j gives n_j . dp = dr_j - (t_j . p) dalpha_j =: e_j; dp follows from e as p from r.
     tj, tk = cj * y - sj * x, ck * y - sk * x
-    for i, o in ((LINE_PUBLISHED, CORNER_PUBLISHED), (LINE_CONSISTENT, CORNER_CONSISTENT)):
+    for i, o in (
+        (LINE_PUBLISHED, CORNER_PUBLISHED),
+        (LINE_CONSISTENT, CORNER_CONSISTENT),
+        (LINE_MAP, CORNER_MAP),
+    ):
         vj = first[i + 3] - 2 * tj * first[i + 1] + tj * tj * first[i]
         vk = second[i + 3] - 2 * tk * second[i + 1] + tk * tk * second[i]
         out[o] = (sk * sk * vj + sj * sj * vk) / (d * d)

@@ -24,6 +24,9 @@ class TopicError(RecordingError):
         super().__init__(message)
         self.topics = topics
 
+    def __reduce__(self) -> tuple[type["TopicError"], tuple[str, tuple[str, ...]]]:
+        return TopicError, (str(self), self.topics)
+
 
 class DeviceError(LidarError):
     """The sensor cannot be used; the message names the cause and the cure."""
@@ -70,7 +73,19 @@ class UnknownSessionError(LandmarkMapError, LookupError):
 
 
 class MapFileError(LandmarkMapError):
-    """No map comes from this file, or no such file from a map: format, version, unit, a bad landmark, no landmarks."""
+    """No map comes from this file, or no such file from a map: format, version, size, nothing in it, disk full."""
+
+
+class GridError(LidarError, ValueError):
+    """An occupancy grid cannot be made: too many cells, no scans, a pose or a size that is no number."""
+
+
+class MaskError(LidarError, ValueError):
+    """A mask of the robot's body makes no sense, or cannot be suggested from these scans."""
+
+
+class MeasureError(LidarError, LookupError):
+    """What is to be measured in a map is not there, or has no such distance or angle."""
 
 
 class LocalizationError(LidarError, ValueError):

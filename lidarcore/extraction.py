@@ -2,25 +2,52 @@
 
 import threading
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from lidarcore.compiled import inlined, kernel
 from lidarcore.corners import find_corners
 from lidarcore.features import Features
-from lidarcore.lines import FITTER_IDS, FITTERS
+from lidarcore.lines import FITTER_IDS, FITTERS, WORK
+from lidarcore.noise import NoiseModel
 from lidarcore.polar import unit_vectors
 from lidarcore.scan import Array, Ints, Scan
-from lidarcore.segmentation import compact, find_pieces, mean_increment, noise_seen
+from lidarcore.segmentation import compact, find_pieces, for_pieces, mean_increment, noise_seen
 from lidarcore.settings import ExtractionSettings
 from lidarcore.tables import FIELDS
 from lidarcore.walls import fit_pieces
 
-Parameters = tuple[float, float, float, float, float, float, float, float]
+
+class Parameters(NamedTuple):
+    """The settings as the kernels take them: variances squared and the angle turned into its sine once."""
+
+    noise: NoiseModel
+    split_threshold: float
+    gap: float
+    min_points: float
+    min_length: float
+    sin_corner_angle: float
+    corner_gap: float
 
 
 def extract(scan: Scan, settings: ExtractionSettings | None = None) -> Features:
-    """Segments and corners of one scan, with covariances in the sensor frame, and what was rejected and why."""
+    """Find the wall segments of one scan and the corners in which they meet, each with its covariance.
+
+    scan      one revolution, sensor frame
+    settings  segmentation, fitter, noise of the sensor; the defaults of ExtractionSettings if None
+
+    Returns `Features`: segments and corners in the sensor frame, and what was rejected and why. A scan without walls
+    has none; that is no error.
+
+    >>> import numpy as np
+    >>> from lidarcore import Scan, extract
+    >>> bearings = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    >>> square = Scan(2 / np.maximum(abs(np.cos(bearings)), abs(np.sin(bearings))), bearings)
+    >>> features = extract(square)
+    >>> len(features.segments), len(features.corners), features.corners.covariance.shape
+    (4, 4, (4, 2, 2))
+    """
     settings = settings or ExtractionSettings()
     return compare(scan, settings, (settings.fitter,))[settings.fitter]
 
@@ -28,9 +55,20 @@ def extract(scan: Scan, settings: ExtractionSettings | None = None) -> Features:
 def compare(
     scan: Scan, settings: ExtractionSettings | None = None, fitters: Iterable[str] = tuple(FITTERS)
 ) -> dict[str, Features]:
-    """The same scan by several fitters: segmented once, fitted by each; keyed by the fitter's name.
+    """Extract features from one scan by several fitters: it is segmented once, and fitted by each.
 
-    Raises ValueError for a name that is not in FITTERS.
+    scan      one revolution, sensor frame
+    settings  as for `extract`; its fitter is not used
+    fitters   names from FITTERS; all of them by default
+
+    Returns the `Features` by each fitter's name. Raises ValueError for a name that is not in FITTERS.
+
+    >>> import numpy as np
+    >>> from lidarcore import Scan, compare
+    >>> bearings = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    >>> square = Scan(2 / np.maximum(abs(np.cos(bearings)), abs(np.sin(bearings))), bearings)
+    >>> {name: len(found.corners) for name, found in compare(square, fitters=["ml", "wctls"]).items()}
+    {'ml': 4, 'wctls': 4}
     """
     settings, names = settings or ExtractionSettings(), tuple(fitters)
     if unknown := [name for name in names if name not in FITTER_IDS]:
@@ -59,10 +97,8 @@ def warm_up() -> None:
 
 
 def _parameters(settings: ExtractionSettings) -> Parameters:
-    """The settings as the kernels take them; variances squared and the angle turned into its sine once."""
-    return (
-        settings.noise.sigma_range**2,
-        settings.noise.sigma_bearing**2,
+    return Parameters(
+        settings.noise.model(settings.latent_bearings),
         settings.split_threshold,
         settings.gap,
         float(settings.min_points),
@@ -74,15 +110,14 @@ def _parameters(settings: ExtractionSettings) -> Parameters:
 
 @kernel
 def _extract(
-    ranges: Array, bearings: Array, fitters: Ints, parameters: Parameters, floats: Array, indices: Ints
+    ranges: Array, bearings: Array, fitters: Ints, settings: Parameters, floats: Array, indices: Ints
 ) -> tuple[Array, Ints, float]:
     """For each fitter a table of segments, corners and rejections, the numbers of each, and the noise seen.
 
     A table has rows of segments, then corners; rejections are its last rows, backwards from the end.
     """
-    v_rho, v_theta, _, _, min_points, min_length, sin_angle, corner_gap = parameters
-    points, weights, beams = floats[:3], floats[3], indices[0]
-    first, last, seen = _segment(ranges, bearings, parameters, points, beams, weights, indices[1:])
+    points, work, beams = floats[:3], floats[3:], indices[0]
+    first, last, seen = _segment(ranges, bearings, settings, points, beams, work[0], indices[1:])
     # Of P pieces every one makes a segment or a rejection, and so does every pair of neighbours: 2 P rows are enough.
     tables, counts = np.empty((len(fitters), 2 * len(first), FIELDS)), np.empty((len(fitters), 3), np.int64)
     for f in range(len(fitters)):
@@ -93,17 +128,16 @@ def _extract(
             first,
             last,
             fitters[f],
-            v_rho,
-            v_theta,
-            min_points,
-            min_length,
-            weights,
+            settings.noise,
+            settings.min_points,
+            settings.min_length,
+            work,
             table,
             backwards,
         )
         counts[f, 0] = n
         counts[f, 1], counts[f, 2] = find_corners(
-            table, n, sin_angle, corner_gap, table[n:], backwards, rejected
+            table, n, settings.sin_corner_angle, settings.corner_gap, table[n:], backwards, rejected
         )
     return tables, counts, seen
 
@@ -112,34 +146,37 @@ def _extract(
 def _segment(
     ranges: Array,
     bearings: Array,
-    parameters: Parameters,
+    settings: Parameters,
     points: Array,
     beams: Ints,
     scratch: Array,
     indices: Ints,
 ) -> tuple[Ints, Ints, float]:
     """Beams to points, points to pieces: first and last point of each, and the noise seen in the ranges."""
-    v_rho, v_theta, threshold, gap = parameters[:4]
     unit_vectors(bearings, points[1], points[2])
     n = compact(ranges, points, beams)
-    # Told too little noise, walls would fall apart: pieces are made for the noise seen, if that is larger.
     seen = noise_seen(points[0, :n], scratch)
-    v_rho = max(v_rho, seen * seen)
+    noise = for_pieces(settings.noise, seen)
     increment = mean_increment(bearings)
-    first, last = find_pieces(points, beams, n, v_rho, v_theta, threshold, gap, increment, scratch, indices)
+    first, last = find_pieces(
+        points, beams, n, noise, settings.split_threshold, settings.gap, increment, scratch, indices
+    )
     return first, last, seen
 
 
 class _Buffers(threading.local):
     """Scratch for one scan, kept for the next one by the same thread."""
 
-    floats = np.empty((4, 0))  # points (rho, c, s), weights
+    floats = np.empty((3 + WORK, 0))  # points (rho, c, s), scratch of the fitters
     indices = np.empty((7, 0), np.int64)  # beams, and those of `find_pieces`
 
     def of(self, beams: int) -> tuple[Array, Ints]:
         """Buffers for a scan of this many beams, and for the ring unrolled."""
         if self.floats.shape[1] < 2 * beams + 2:
-            self.floats, self.indices = np.empty((4, 2 * beams + 2)), np.empty((7, 2 * beams + 2), np.int64)
+            self.floats, self.indices = (
+                np.empty((3 + WORK, 2 * beams + 2)),
+                np.empty((7, 2 * beams + 2), np.int64),
+            )
         return self.floats, self.indices
 
 

@@ -19,7 +19,7 @@ from lidarcore.settings import Covariance, ExtractionSettings
 
 
 class _View:
-    """Rows of a kernel's table, and which of the two covariances `covariance` means."""
+    """Rows of a kernel's table, and which of the covariances `covariance` means."""
 
     def __init__(self, table: Array, which: Covariance) -> None:
         self._table = table
@@ -38,13 +38,16 @@ class Segments(_View):
     @cached_property
     def lines(self) -> Lines:
         """The fitted lines, with covariances of (alpha, r)."""
-        published, consistent = (self._matrices(c) for c in (tables.LINE_PUBLISHED, tables.LINE_CONSISTENT))
+        published, consistent, for_maps = (
+            self._matrices(c) for c in (tables.LINE_PUBLISHED, tables.LINE_CONSISTENT, tables.LINE_MAP)
+        )
         return Lines(
             normal_angle(self._table[:, tables.NORMAL], self._table[:, tables.NORMAL + 1]),
             self._table[:, tables.DISTANCE],
             published,
             consistent,
-            published if self._which == "published" else consistent,
+            for_maps,
+            {"published": published, "consistent": consistent, "map": for_maps}[self._which],
         )
 
     @property
@@ -95,7 +98,11 @@ class Corners(_View):
     @property
     def covariance(self) -> Array:
         """(K, 2, 2) m², the kind the settings ask for."""
-        return self.covariance_published if self._which == "published" else self.covariance_consistent
+        return {
+            "published": self.covariance_published,
+            "consistent": self.covariance_consistent,
+            "map": self.covariance_map,
+        }[self._which]
 
     @property
     def covariance_published(self) -> Array:
@@ -106,6 +113,11 @@ class Corners(_View):
     def covariance_consistent(self) -> Array:
         """(K, 2, 2) m², from the lines' consistent covariances."""
         return self._matrices(tables.CORNER_CONSISTENT)
+
+    @property
+    def covariance_map(self) -> Array:
+        """(K, 2, 2) m², from what is not known of where the walls are: for maps, and for looks from several places."""
+        return self._matrices(tables.CORNER_MAP)
 
     @property
     def sigma(self) -> Array:
@@ -171,14 +183,14 @@ _REASONS: dict[int, tuple[Literal["segment", "corner"], str, str]] = {
     tables.TOO_FEW_POINTS: (
         "segment",
         "too few points",
-        "{value:.0f} points in one line; min_points asks for {limit:.0f}.",
+        "Too few points in a line: {value:.0f}, and min_points is {limit:.0f}.",
     ),
-    tables.TOO_SHORT: ("segment", "too short", "{value:.2f} m long; min_length asks for {limit:.2f} m."),
+    tables.TOO_SHORT: ("segment", "too short", "Too short: {value:.2f} m, and min_length is {limit:.2f} m."),
     tables.DEGENERATE: ("segment", "no line", "The fitter gave no line: {found}."),
     tables.TOO_FLAT: (
         "corner",
         "angle too small",
-        "{angle:.0f}° between the walls; corner_angle asks for {least:.0f}°.",
+        "The walls are too parallel: {angle:.0f}° apart, and corner_angle is {least:.0f}°.",
     ),
     tables.TOO_FAR: (
         "corner",

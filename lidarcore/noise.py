@@ -1,6 +1,7 @@
-"""The sensor's noise: independent Gaussian errors of range and bearing [CWLF 10]."""
+"""The sensor's noise: independent errors of range and bearing [CWLF 10], and what real walls and rooms add to them."""
 
-from typing import Annotated
+from functools import lru_cache
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,22 +10,144 @@ from pydantic.dataclasses import dataclass
 
 Metres = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False, json_schema_extra={"unit": "m"})]
 Radians = Annotated[float, Field(gt=0, le=0.05, allow_inf_nan=False, json_schema_extra={"unit": "rad"})]
+Growth = Annotated[float, Field(ge=0, le=0.1, allow_inf_nan=False, json_schema_extra={"unit": "1/m"})]
+Deviation = Annotated[float, Field(ge=0, le=0.1, allow_inf_nan=False, json_schema_extra={"unit": "m"})]
+Length = Annotated[float, Field(ge=0.005, le=2, allow_inf_nan=False, json_schema_extra={"unit": "m"})]
+Tails = Annotated[float, Field(ge=0, le=0.5, allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+
+
+class NoiseModel(NamedTuple):
+    """The noise as kernels take it.
+
+    v_rho m² and v_theta rad², variances of range and bearing; growth 1/m², v_rho grows by growth rho⁴; v_wall m², the
+    variance of walls about straight lines, and length m over which it is alike; renewal, share of it that is another in
+    the next scan from the same place, and resampling, how far beams fall elsewhere on the rest; v_systematic m²; tails,
+    and by how much robust weights widen the variance of Gaussian errors; latent, whether ml looks for the true
+    bearings.
+    """
+
+    v_rho: float
+    v_theta: float
+    growth: float = 0.0
+    v_wall: float = 0.0
+    length: float = 1.0
+    renewal: float = 1.0
+    resampling: float = 0.0
+    v_systematic: float = 0.0
+    tails: float = 0.0
+    widened: float = 0.0
+    latent: bool = False
 
 
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True)
 class SensorNoise:
-    """Standard deviations of one beam. Both must be positive: no sensor is exact, and weights divide by them."""
+    """Standard deviations of one beam, of the walls it meets and of what stays the same in every scan.
 
-    sigma_range: Annotated[Metres, Field(description="standard deviation of a range")] = 0.02
-    sigma_bearing: Annotated[Radians, Field(description="standard deviation of a bearing")] = 0.0034
+    The first two must be positive: no sensor is exact, and weights divide by them. The others may be 0, which is the
+    noise model of the papers: white errors on perfectly straight walls.
+    """
+
+    sigma_range: Annotated[
+        Metres, Field(description="standard deviation of a range. More: larger ellipses, fewer splits")
+    ] = 0.02
+    sigma_bearing: Annotated[
+        Radians,
+        Field(
+            description="standard deviation of a bearing. More: larger ellipses where walls are far or seen at a slant"
+        ),
+    ] = 0.0034
+    range_growth: Annotated[
+        Growth,
+        Field(
+            description="times the square of a range: what its standard deviation grows by. More: far walls count less"
+        ),
+    ] = 0.0
+    unevenness: Annotated[
+        Deviation,
+        Field(
+            description="standard deviation of a wall's surface from a straight line. More: larger ellipses"
+        ),
+    ] = 0.0
+    unevenness_length: Annotated[
+        Length,
+        Field(
+            description="distance along a wall over which its unevenness is alike (correlation 1/e). More: long "
+            "walls are known less well"
+        ),
+    ] = 0.08
+    systematic: Annotated[
+        Deviation,
+        Field(
+            description="what a wall is off by in every scan from one place. More: larger ellipses in maps"
+        ),
+    ] = 0.0
+
+    tails: Annotated[
+        Tails,
+        Field(
+            description="weight of the tails of errors: 1 over Student's degrees of freedom, 0 for Gaussian. More: "
+            "single points that are far off count less"
+        ),
+    ] = 0.0
+    renewal: Annotated[
+        Share,
+        Field(
+            description="share of the unevenness that is another one in the next scan from the same place: 1 if "
+            "nothing of it repeats, 0 if all of it does. More: a standing sensor's corners scatter more"
+        ),
+    ] = 1.0
+    resampling: Annotated[
+        Share,
+        Field(
+            description="how far beams fall elsewhere on the unevenness that repeats: 1 anywhere between their "
+            "neighbours in every revolution, 0 on the same spots. More: a standing sensor's corners scatter more"
+        ),
+    ] = 0.0
+
+    def model(self, latent: bool = False) -> NoiseModel:
+        """The noise as kernels take it; latent: whether ml looks for the true bearings."""
+        return NoiseModel(
+            self.sigma_range**2,
+            self.sigma_bearing**2,
+            self.range_growth**2,
+            self.unevenness**2,
+            self.unevenness_length,
+            self.renewal,
+            self.resampling,
+            self.systematic**2,
+            self.tails,
+            _widened(self.tails),
+            latent,
+        )
+
+    def range_variances(self, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Variances m² of ranges (N,) m: sigma_range² + (range_growth rho²)²."""
+        variances: NDArray[np.float64] = self.sigma_range**2 + (self.range_growth * ranges**2) ** 2
+        return variances
 
     def point_covariances(
         self, ranges: NDArray[np.float64], bearings: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Covariances of the points (x, y) of beams (N,) in m and rad, sensor frame: (N, 2, 2) m² [CWLF 10]."""
+        """Covariances of the points (x, y) of beams (N,) in m and rad, sensor frame: (N, 2, 2) m² [CWLF 10].
+
+        Of the beams' own errors: unevenness and the systematic part are the walls'.
+        """
         c, s = np.cos(bearings), np.sin(bearings)
-        v_r, v_t = self.sigma_range**2, (ranges * self.sigma_bearing) ** 2
+        v_r, v_t = self.range_variances(ranges), (ranges * self.sigma_bearing) ** 2
         v_xy = (v_r - v_t) * s * c
         return np.stack(
             [np.stack([v_r * c**2 + v_t * s**2, v_xy], -1), np.stack([v_xy, v_r * s**2 + v_t * c**2], -1)], -2
         )
+
+
+@lru_cache
+def _widened(tails: float) -> float:
+    """By how much the variance of a Gaussian's location grows, relatively, where errors are weighted as Student's.
+
+    E[psi²] / E[psi']² - 1 with psi = z (1 + tails) / (1 + tails z²), by Gauss-Hermite quadrature.
+    """
+    z, weights = np.polynomial.hermite_e.hermegauss(80)
+    psi = z * (1 + tails) / (1 + tails * z**2)
+    slope = (1 + tails) * (1 - tails * z**2) / (1 + tails * z**2) ** 2
+    return float(weights.sum() * (weights @ psi**2) / (weights @ slope) ** 2 - 1)

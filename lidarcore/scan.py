@@ -6,10 +6,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.errors import ScanError
+from lidarcore.geometry import unit_vectors
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+__all__ = ["MAX_BEARING", "Array", "Ints", "Scan"]
 
 MAX_BEARING = 8 * np.pi  # rad; beyond a few turns they are surely in another unit
 
@@ -98,7 +99,7 @@ class Scan:
     @cached_property
     def xy(self) -> Array:
         """(N, 2) m, sensor frame; NaN where there was no return."""
-        xy: Array = self.ranges[:, None] * np.stack([np.cos(self.bearings), np.sin(self.bearings)], -1)
+        xy: Array = self.ranges[:, None] * unit_vectors(self.bearings)
         return xy
 
 

@@ -13,7 +13,7 @@ from lidarcore.fields import number
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise
 
-Covariance = Literal["consistent", "published"]
+Covariance = Literal["consistent", "published", "map"]
 
 
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
@@ -28,13 +28,18 @@ class ExtractionSettings:
     ] = "ml"
     covariance: Annotated[Covariance, Field(description="which covariance `covariance` means")] = "consistent"
     noise: SensorNoise = field(default_factory=SensorNoise)
+    latent_bearings: Annotated[
+        bool,
+        Field(description="ml looks for each beam's true bearing: without bias at grazing incidence"),
+    ] = True
     split_threshold: Annotated[
         float,
         number(
             0.005,
             1.0,
             "m",
-            "a piece is split where a point is farther from its chord than this and than noise explains",
+            "a piece is split where a point is farther from its chord than this and than noise explains; where the "
+            "unevenness of walls is given, noise and unevenness decide alone. More: fewer, longer walls",
         ),
     ] = 0.05
     gap: Annotated[
@@ -43,20 +48,28 @@ class ExtractionSettings:
             0.02,
             5.0,
             "m",
-            "neighbouring points farther apart are not connected, unless as on a wall seen at a grazing angle",
+            "neighbouring points farther apart are not connected, unless as on a wall seen at a grazing angle. More: "
+            "walls go on across wider gaps",
         ),
     ] = 0.3
     min_points: Annotated[
-        int, Field(ge=2, le=1000, description="a segment needs at least this many points")
+        int,
+        Field(
+            ge=2,
+            le=1000,
+            description="a segment needs at least this many points. More: fewer short or far walls",
+        ),
     ] = 6
-    min_length: Annotated[float, number(0.0, 10.0, "m", "a segment must be at least this long")] = 0.2
+    min_length: Annotated[
+        float, number(0.0, 10.0, "m", "a segment must be at least this long. More: short walls are rejected")
+    ] = 0.2
     corner_angle: Annotated[
         float,
         Field(
             ge=0.02,
             le=1.57,
             allow_inf_nan=False,
-            description="two walls make a corner if the angle between them is at least this",
+            description="two walls make a corner if the angle between them is at least this. More: fewer flat corners",
             json_schema_extra={"unit": "rad"},
         ),
     ] = 0.35
@@ -66,7 +79,8 @@ class ExtractionSettings:
             0.01,
             2.0,
             "m",
-            "both facing ends must be this close to the intersection, beyond point spacing and noise",
+            "both facing ends must be this close to the intersection, beyond point spacing and noise. More: corners "
+            "also where walls do not quite meet",
         ),
     ] = 0.2
 

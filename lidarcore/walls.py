@@ -5,6 +5,7 @@ import numpy as np
 from lidarcore.compiled import inlined
 from lidarcore.lines import fit_piece
 from lidarcore.lines.regression import OK
+from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
 from lidarcore.tables import (
     DEGENERATE,
@@ -33,15 +34,14 @@ def fit_pieces(
     first: Ints,
     last: Ints,
     fitter: int,
-    v_rho: float,
-    v_theta: float,
+    noise: NoiseModel,
     min_points: float,
     min_length: float,
-    w: Array,
+    work: Array,
     segments: Array,
     rejections: Array,
 ) -> tuple[int, int]:
-    """Write a row for each accepted segment and each rejected piece; their numbers. w is scratch."""
+    """Write a row for each accepted segment and each rejected piece; their numbers. work is scratch."""
     n_segments = n_rejections = 0
     for p in range(len(first)):
         a, b = first[p], last[p]
@@ -57,7 +57,9 @@ def fit_pieces(
             trim = 1 if row[N_POINTS] >= _TRIM_FROM else 0
             inside = slice(a + trim, b + 1 - trim)
             rho, c, s = points[0, inside], points[1, inside], points[2, inside]
-            status = fit_piece(fitter, rho, c, s, v_rho, v_theta, w[inside], row)
+            status = fit_piece(
+                fitter, rho, c, s, noise, (work[0, inside], work[1, inside], work[2, inside]), row
+            )
             if status != OK:
                 reason, value = DEGENERATE, status
             else:

@@ -1,6 +1,7 @@
 // Runs in viser's page before viser does: turns its 3D view into a map seen from above, inside our page.
-// The parent uses window.lidarView; it is sent the keys, so that its shortcuts work wherever the focus is, and the
-// pose that someone drags: {type: "pose", x, y, heading} in the world, m and rad.
+// The parent uses window.lidarView, gives it the extent of each frame, and asks how the floor lies in the window, to draw
+// over it; it is sent the keys, so that its shortcuts work wherever the focus is, and the pose that someone drags:
+// {type: "pose", x, y, heading} in the world, m and rad.
 
 (() => {
   "use strict";
@@ -8,10 +9,10 @@
   const MARGIN = 1.08; // around the room when it is looked at,
   const EDGE = 1.02; // and what has to be left of it
   const SMALL = 0.6; // of the view: a room that fills less than this is looked at again
-  const FOLLOW_MS = 1000;
   const CLICK_PX = 4; // a pointer that moves less while it is pressed
   const SHORT_DRAG = 12; // px; shorter ones have no direction
-  const AT_ORIGIN = { x: 0, y: 0, heading: 0 };
+  const POINT_PX = 3; // of the measured points, at every zoom
+  const POINTS = ["/body/points", "/body/rejected/points"];
   // viser's own panel and notices have no place here: the page around this one has its own.
   const STYLE = `
     [data-floating-window], .mantine-Notifications-root, .mantine-Paper-root { display: none !important }
@@ -19,6 +20,7 @@
     .pose-catcher svg { width: 100%; height: 100%; fill: none; stroke: #ffe14d; stroke-width: 3 }
     .pose-catcher .halo { stroke: #14171a; stroke-width: 6 }`;
 
+  let room = null; // what the newest frame shows: from and to along x, along y, m in the world
   let rotating = false;
   let moved = false; // by the user, since the last fit
   let pressed = null; // where the pointer went down last
@@ -58,53 +60,25 @@
     if (!rotating) await fit();
   }
 
-  /** Look down on all of the newest scan. */
-  async function fit() {
-    const room = await measure();
+  /** Look down on all of the extent, else on that of the newest frame. */
+  async function fit(extent = room) {
+    room = extent;
+    await ready;
     if (!room) return;
-    lookDownOn(room);
+    lookDownOn(spans());
     moved = false;
   }
 
-  /** Until the user moves the view, keep the room in it. */
-  async function follow() {
-    const room = moved || rotating || placing || document.hidden ? null : await measure();
-    if (room && !isInView(room)) lookDownOn(room);
-  }
-
-  /** Centre and half width of the newest scan along x and y of the world; null while there is none. */
-  async function measure() {
+  /** Show a new frame; until the user moves the view, its extent is kept in it. */
+  async function follow(extent) {
+    room = extent;
     await ready;
-    const health = await ask("health");
-    const frame = health?.ready ? await ask("frame?points=true") : null;
-    if (!frame) return null;
-    const { x, y, heading } = frame.localization?.pose ?? AT_ORIGIN;
-    const [cos, sin] = [Math.cos(heading), Math.sin(heading)];
-    const placed = frame.points.map(([ahead, left]) => [
-      x + cos * ahead - sin * left,
-      y + sin * ahead + cos * left,
-    ]);
-    return [x, y].map((sensor, axis) =>
-      span(
-        placed.map((point) => point[axis]),
-        sensor,
-      ),
-    );
+    if (moved || rotating || placing || document.hidden) return;
+    if (!isInView(spans())) lookDownOn(spans());
   }
 
-  async function ask(path) {
-    const answer = await fetch(`../api/v1/${path}`).catch(() => null);
-    return answer?.ok ? answer.json() : null;
-  }
-
-  /** The sensor included, a few stray points not. */
-  function span(values, sensor) {
-    values.sort((a, b) => a - b);
-    const stray = Math.floor(values.length / 300);
-    const low = Math.min(sensor - 0.5, values[stray] ?? sensor);
-    const high = Math.max(sensor + 0.5, values[values.length - 1 - stray] ?? sensor);
-    return { centre: (low + high) / 2, half: (high - low) / 2 };
-  }
+  /** Centre and half width of the room along x and y. */
+  const spans = () => room.map(([low, high]) => ({ centre: (low + high) / 2, half: (high - low) / 2 }));
 
   function lookDownOn([x, y]) {
     const height = (MARGIN * Math.max(y.half, x.half / camera().aspect)) / slope();
@@ -198,17 +172,80 @@
     tell({ type: "keydown", key, code, altKey, ctrlKey, metaKey, shiftKey });
   }
 
+  let hidden = []; // names of viser's nodes
+
+  /** Show all nodes but these, in this browser only. */
+  function hide(names) {
+    hidden = names;
+    if (window.__viserMutable) applyHidden();
+  }
+
+  /** viser draws only when it is asked to; a node holds its children, the root all of them. */
+  function applyHidden() {
+    const { nodeRefFromName, requestRender } = window.__viserMutable;
+    const unseen = new Set();
+    for (const [name, node] of Object.entries(nodeRefFromName)) {
+      if (hidden.some((one) => name.startsWith(one))) node?.traverse((part) => unseen.add(part));
+    }
+    let isStale = false;
+    nodeRefFromName[""]?.traverse((part) => {
+      const mask = unseen.has(part) ? 0 : 1; // of three.js's layers: none, or the first
+      isStale ||= part.layers.mask !== mask;
+      part.layers.mask = mask;
+    });
+    if (isStale) requestRender();
+  }
+
+  /** viser makes objects anew when what they hold changes its size, so they are looked after all the time. */
+  function keepHidden() {
+    applyHidden();
+    requestAnimationFrame(keepHidden);
+  }
+
+  /** The homography from the floor (x, y, 1) to pixels of the window, row by row; null until there is a view. */
+  function floorToWindow() {
+    if (!controls() || !camera()) return null;
+    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    camera().updateMatrixWorld();
+    const m = camera().projectionMatrix.clone().multiply(camera().matrixWorldInverse).elements;
+    const [right, up, , depth] = [0, 1, 2, 3].map((i) => [-m[8 + i], -m[i], m[12 + i]]); // of x, y and 1
+    return [
+      ...depth.map((d, k) => (left + width / 2) * d + (width / 2) * right[k]),
+      ...depth.map((d, k) => (top + height / 2) * d - (height / 2) * up[k]),
+      ...depth,
+    ];
+  }
+
+  let looked = () => {};
+
+  /** Calls `run` whenever the camera has moved, before the scene is drawn from there. */
+  const onLook = (run) => (looked = run);
+
+  /** Points have a size of the screen; viser knows only metres. */
+  function sizePoints() {
+    const scale = POINT_PX * devicePixelRatio * controls().distance;
+    for (const name of POINTS) {
+      window.__viserMutable.nodeRefFromName[name]?.traverse(({ isPoints, material }) => {
+        if (!isPoints || material.uniforms.scale.value === scale) return;
+        material.uniforms.scale.value = scale;
+        window.__viserMutable.requestRender();
+      });
+    }
+  }
+
+  /** viser sets the sizes itself when its window or the points change, so ours are looked after all the time. */
+  function keepSizes() {
+    sizePoints();
+    requestAnimationFrame(keepSizes);
+  }
+
   async function start() {
     while (!controls() || !camera()) await pause(50);
     applyMode();
-  }
-
-  async function keepFollowing() {
-    await ready;
-    for (;;) {
-      await follow();
-      await pause(FOLLOW_MS);
-    }
+    keepHidden();
+    controls().addEventListener("update", () => looked());
+    window.addEventListener("resize", () => looked());
+    keepSizes();
   }
 
   const style = document.createElement("style");
@@ -219,6 +256,5 @@
   window.addEventListener("pointerdown", (event) => (pressed = event), true);
   window.addEventListener("pointermove", (event) => (moved ||= !placing && isDrag(event)), true);
   const ready = start();
-  window.lidarView = { setRotate, fit, setPlacing };
-  keepFollowing();
+  window.lidarView = { setRotate, fit, follow, setPlacing, floorToWindow, onLook, hide };
 })();

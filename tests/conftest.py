@@ -1,26 +1,27 @@
-"""For all tests: compiled kernels, the same examples on every run, and the real recordings.
+"""For all tests: parallel processes, compiled kernels, the same examples on every run, and the real recordings.
 
-The recordings lie beside the checkout: their licences do not allow shipping most of them.
+Most recordings lie beside the checkout, because their licences do not allow shipping them; what tests/data holds comes
+along.
 """
 
+import fcntl
 import os
 import signal
 from pathlib import Path
 
 import hypothesis
+import numba
 import pytest
-from hypothesis.internal.conjecture import providers
+from real_recordings import SHARED, SHIPPED
 
-from lidarcore import warm_up
+import lidarcore
+from lidarcore import localization, warm_up
 
-DATA = Path(__file__).parents[2] / "shared" / "data"
+COMPILING = Path(lidarcore.__file__).parent / "__pycache__" / "compiling"
+# Longest first: with whole files handed out to the processes, a long one that comes last leaves the others idle.
+ORDER = ("browser", "evaluation", "experiments", "guide", "mapping", "localization", "laws", "app")
 
-
-# The same examples on every run, so that a failure is a change of the code and not of the dice. Numbers that happen to
-# stand in the modules loaded would be examples, too, and others with every edit and every choice of tests.
-assert callable(providers._get_local_constants), "hypothesis draws constants of the code in another way now"
-providers._get_local_constants = providers.Constants
-# A machine that is busy is no reason to fail either.
+# The same examples on every run of the same code; a busy machine is no reason to fail.
 hypothesis.settings.register_profile(
     "repeatable",
     deadline=None,
@@ -37,32 +38,52 @@ for ignored in (signal.SIGINT, signal.SIGHUP):
         signal.signal(ignored, lambda *_: None)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _compiled() -> None:
-    """Compile once, before anything is timed or waited for."""
-    warm_up()
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile before anything is timed or waited for, in one process while the others wait for what it keeps."""
+    hands_out = session.config.getoption("numprocesses", None) and not hasattr(session.config, "workerinput")
+    if hands_out or session.config.option.collectonly or numba.config.DISABLE_JIT:
+        return
+    COMPILING.parent.mkdir(exist_ok=True)
+    with COMPILING.open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        warm_up()
+        localization.warm_up()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """As many processes as there are cores; at least two, because much of a test's time is waiting."""
+    return max(2, len(os.sched_getaffinity(0)))
 
 
 @pytest.fixture(scope="session")
 def data() -> Path:
-    """The folder of real recordings."""
-    return DATA
+    """The folder of the real recordings beside the checkout."""
+    return SHARED
+
+
+@pytest.fixture(scope="session")
+def shipped() -> Path:
+    """The folder of the real recordings that come along."""
+    return SHIPPED
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without the recordings, leave out the tests that read them; CI must have them."""
-    if DATA.is_dir():
+    """Longest first. Without the recordings, leave out the tests that read them; CI must have them."""
+    places = {name: place for place, name in enumerate(ORDER)}
+    items.sort(key=lambda item: places.get(item.path.parent.name, len(ORDER)))
+    if SHARED.is_dir():
         return
     if os.environ.get("CI"):
-        pytest.exit(f"CI needs the real recordings in {DATA}.", returncode=1)
+        pytest.exit(f"CI needs the real recordings in {SHARED}.", returncode=1)
     kept = [item for item in items if not _reads_recordings(item)]
     config.hook.pytest_deselected(items=[item for item in items if _reads_recordings(item)])
     items[:] = kept
 
 
 def pytest_report_header() -> str:
-    there = "read from" if DATA.is_dir() else "not found, their tests are left out:"
-    return f"real recordings: {there} {DATA}"
+    there = "read from" if SHARED.is_dir() else "not found, their tests are left out:"
+    return f"real recordings: {there} {SHARED}"
 
 
 def _reads_recordings(item: pytest.Item) -> bool:

@@ -207,10 +207,16 @@ class Client:
         return profiles
 
     def save_profile(
-        self, name: str, sigma_range: float, sigma_bearing: float, *, overwrite: bool = False
+        self,
+        name: str,
+        sigma_range: float,
+        sigma_bearing: float,
+        *,
+        overwrite: bool = False,
+        **parts: float,
     ) -> None:
-        """Save a noise (m, rad) as a profile of the server."""
-        noise = {"sigma_range": sigma_range, "sigma_bearing": sigma_bearing}
+        """Save a noise (m, rad) as a profile of the server; parts: others of `SensorNoise`, such as unevenness."""
+        noise = {"sigma_range": sigma_range, "sigma_bearing": sigma_bearing, **parts}
         query = "?overwrite=true" if overwrite else ""
         self._connection.send(
             "PUT", f"/profiles/{quote(name, safe='')}{query}", {"extraction": {"noise": noise}}

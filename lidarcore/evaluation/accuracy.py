@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from lidarcore.extraction import extract
 from lidarcore.features import Features, Segments
+from lidarcore.geometry import act_inverse, unit_vectors
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Ints
 from lidarcore.settings import ExtractionSettings
@@ -77,7 +78,7 @@ def measure_accuracy(sigma_range: float, scans: int, seed: int, fitter: str = "m
 def _count(
     result: Accuracy, world: World, pose: Array, hit: Ints, features: Features, bearings: Array
 ) -> None:
-    walls = _in_sensor_frame(world.walls, pose)
+    walls = act_inverse(pose, world.walls)
     segments = features.segments
     tolerance = 0.03 + 3 * features.settings.noise.sigma_range
     on_wall = _lies_on(segments.start, segments.end, walls, tolerance)
@@ -98,12 +99,6 @@ def _count(
         distances = np.linalg.norm(features.corners.xy - corner, axis=1)
         if len(distances) and distances.min() < CORNER_RADIUS:
             result.corner_errors.append(float(distances.min()))
-
-
-def _in_sensor_frame(walls: Array, pose: Array) -> Array:
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    moved: Array = (walls - pose[:2]) @ np.array([[c, -s], [s, c]])
-    return moved
 
 
 def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> NDArray[np.bool_]:
@@ -144,7 +139,7 @@ def _extent(wall: Array, bearings: Array) -> float:
     """Length (m) of the part of a wall between beams at these bearings."""
     tangent = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])
     normal = np.array([-tangent[1], tangent[0]])
-    u = np.stack([np.cos(bearings), np.sin(bearings)], 1)
+    u = unit_vectors(bearings)
     return float(np.ptp((wall[0] @ normal) / (u @ normal) * (u @ tangent)))
 
 

@@ -35,7 +35,7 @@ class Interval:
         return f"{value} ± {factor * self.half_width:.{digits}f}" if np.isfinite(self.half_width) else value
 
     def root(self) -> "Interval":
-        """The same for the square root; what is below 0 by chance becomes 0."""
+        """The interval of the square root; an end below 0, which chance can make, becomes 0."""
         value, low, high = np.sqrt(np.maximum([self.value, self.low, self.high], 0.0)).tolist()
         return Interval(value, low, high)
 
@@ -62,7 +62,7 @@ def ratio(numerators: Array, denominators: Array) -> Interval:
 
 
 def share(hits: Array, trials: Array) -> Interval:
-    """The same for a share of trials: Wilson's interval, which stays within 0 and 1.
+    """The interval of a share of trials: Wilson's, which stays within 0 and 1.
 
     Its number of trials is that of independent ones with the scatter between blocks; all of them where the share is
     0 or 1 and nothing scatters.

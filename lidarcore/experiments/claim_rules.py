@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from lidarcore.evaluation.intervals import LEVEL, Interval
-from lidarcore.experiments.report import NOT_COMPARABLE, Agreement
+from lidarcore.reporting import NOT_COMPARABLE, Agreement
 from lidarcore.scan import Array
 
 Claim = tuple[str, str, Agreement]

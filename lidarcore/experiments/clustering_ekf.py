@@ -17,9 +17,9 @@ import numpy as np
 from lidarcore.clusters import CLUSTERERS, Clusters, ClusterSettings, cluster
 from lidarcore.evaluation.workers import run_all
 from lidarcore.experiments.tracks import Errors, Track, dead_reckoned, errors, filtered
+from lidarcore.geometry import relative
 from lidarcore.localization import LocalizationSettings, OdometryNoise, deskew
 from lidarcore.noise import SensorNoise
-from lidarcore.poses import compose, inverse
 from lidarcore.scan import Array, Scan
 from lidarcore.simulation.posts import scattered
 from lidarcore.simulation.robot import RATE, SimulatedRobot
@@ -63,7 +63,7 @@ class Design:
         return LocalizationSettings(odometry=self.odometry)
 
     def quick(self) -> "Design":
-        """The same with one scan a second: to try it out."""
+        """This design with one scan a second, to try it out."""
         return replace(self, every=10)
 
 
@@ -109,7 +109,7 @@ class Drive:
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class ClusteringStudy:
     """All outcomes of an experiment, sorted by run, trajectory and method."""
 
     design: Design
@@ -125,14 +125,14 @@ class Result:
         return self.values(lambda outcome: float(getattr(outcome.errors[mode], name)))
 
 
-def run(design: Design, workers: int = 1, done: Callable[[], None] = lambda: None) -> Result:
+def run(design: Design, workers: int = 1, done: Callable[[], None] = lambda: None) -> ClusteringStudy:
     """The whole experiment; `done` is called after each of the runs times trajectories drives.
 
     All but the times is the same for the same design, whatever the number of workers.
     """
     drives = [(run, trajectory) for run in range(design.runs) for trajectory in TRAJECTORIES]
     outcomes = run_all(partial(outcomes_of_drive, design), drives, workers, done)
-    return Result(design, [outcome for of_drive in outcomes for outcome in of_drive])
+    return ClusteringStudy(design, [outcome for of_drive in outcomes for outcome in of_drive])
 
 
 def outcomes_of_drive(design: Design, drive_: tuple[int, str]) -> list[Outcome]:
@@ -169,7 +169,7 @@ def _deskewed(scans: Sequence[Scan]) -> list[Scan]:
     for before, scan in pairwise(scans):
         assert before.odometry is not None
         assert scan.odometry is not None
-        moved = compose(inverse(before.odometry), scan.odometry) / (scan.stamp - before.stamp)
+        moved = relative(before.odometry, scan.odometry) / (scan.stamp - before.stamp)
         straight.append(deskew(scan, moved[0], moved[2]))
     return straight
 

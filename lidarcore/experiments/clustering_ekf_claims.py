@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarcore.clusters import CLUSTERERS
 from lidarcore.evaluation.intervals import Interval, mean
-from lidarcore.experiments.clustering_ekf import METHODS, Result
+from lidarcore.experiments.clustering_ekf import METHODS, ClusteringStudy
 from lidarcore.scan import Array
 
 Claim = tuple[str, str, bool | None]
@@ -16,7 +16,7 @@ PAPER = -0.05
 """Error with DBSCAN against the others', relative: the paper's conclusion."""
 
 
-def claims(result: Result) -> list[Claim]:
+def claims(result: ClusteringStudy) -> list[Claim]:
     """The paper's claims in its order."""
     ms = 1e3 * result.values(lambda o: (o.clustering_s + o.filter_s) / o.scans).mean(axis=(0, 1))
     return [
@@ -34,13 +34,13 @@ def _of_time(claim: str, ms: Array, agrees: bool) -> Claim:
     return claim, f"ms a scan with the filter, from the fastest: {order}.", agrees
 
 
-def dbscan_against_others(result: Result) -> Interval:
+def dbscan_against_others(result: ClusteringStudy) -> Interval:
     """Accumulated error with DBSCAN and the filter over the mean of the other methods', less 1; paired by run."""
     total = result.error("with", "accumulated").sum(axis=1)
     return mean(total[:, _DBSCAN] / total[:, _OTHERS].mean(axis=1) - 1)
 
 
-def _five_per_cent(result: Result) -> Claim:
+def _five_per_cent(result: ClusteringStudy) -> Claim:
     ratio = dbscan_against_others(result)
     agrees = ratio.contains(PAPER)
     return (
@@ -50,7 +50,7 @@ def _five_per_cent(result: Result) -> Claim:
     )
 
 
-def _least(result: Result) -> Claim:
+def _least(result: ClusteringStudy) -> Claim:
     total = result.error("with", "accumulated").sum(axis=1)
     best = min(_OTHERS, key=lambda m: float(total[:, m].mean()))
     difference = mean(total[:, _DBSCAN] - total[:, best])
@@ -61,7 +61,7 @@ def _least(result: Result) -> Claim:
     )
 
 
-def _filter_helps(result: Result) -> Claim:
+def _filter_helps(result: ClusteringStudy) -> Claim:
     total = {mode: result.error(mode, "accumulated").sum(axis=1).mean(axis=1) for mode in ("without", "with")}
     ratio = mean(total["with"] / total["without"] - 1)
     return (
@@ -71,7 +71,7 @@ def _filter_helps(result: Result) -> Claim:
     )
 
 
-def _recovers(result: Result) -> Claim:
+def _recovers(result: ClusteringStudy) -> Claim:
     largest = mean(result.error("lost", "largest").mean(axis=(1, 2)))
     final = result.error("lost", "final").mean(axis=(1, 2))
     undisturbed = result.error("with", "final").mean(axis=(1, 2))

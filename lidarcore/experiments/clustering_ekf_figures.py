@@ -5,13 +5,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lidarcore import reporting
 from lidarcore.clusters import CLUSTERERS
 from lidarcore.evaluation.intervals import Interval, mean
-from lidarcore.experiments import report
-from lidarcore.experiments.clustering_ekf import METHODS, MODES, TRAJECTORIES, Design, Drive, Result, simulate
-from lidarcore.experiments.figures import Bar, Map, bars, chart
+from lidarcore.experiments.clustering_ekf import (
+    METHODS,
+    MODES,
+    TRAJECTORIES,
+    ClusteringStudy,
+    Design,
+    Drive,
+    simulate,
+)
 from lidarcore.experiments.tracks import Track
-from lidarcore.localization.measurement import to_world
+from lidarcore.geometry import act, unit_vectors
+from lidarcore.reporting import Bar, Map, bars, chart
 from lidarcore.scan import Array
 
 NAMES = tuple(CLUSTERERS[name].title for name in METHODS)
@@ -33,7 +41,7 @@ def _farthest(cells: Sequence[Sequence[Interval]]) -> float:
     )
 
 
-def figure3(result: Result) -> str:
+def figure3(result: ClusteringStudy) -> str:
     """Run time of each method and trajectory; of a scan in a table."""
     total = _of(result.values(lambda o: o.clustering_s + o.filter_s))
     most, least = _farthest(total), 1e-2
@@ -62,10 +70,10 @@ def figure3(result: Result) -> str:
     ]
     rows = [[name, *(mean(values[:, m]).text(2) for values in per_scan)] for m, name in enumerate(NAMES)]
     headers = ("method", "clustering", "number of clusters told", "filter")
-    return report.figure(caption, panels) + report.table("Processor time of a scan, ms", headers, rows)
+    return reporting.figure(caption, panels) + reporting.table("Processor time of a scan, ms", headers, rows)
 
 
-def figure4(result: Result) -> str:
+def figure4(result: ClusteringStudy) -> str:
     """Accumulated error of each method, trajectory and mode; with other errors in tables."""
     cells = {mode: _of(result.error(mode, "accumulated")) for mode in MODES}
     most = _farthest([row for of in cells.values() for row in of])
@@ -88,27 +96,27 @@ def figure4(result: Result) -> str:
         + _error_table(result, "rms", "RMS distance from the true position, mm", 1e3, 0)
         + _error_table(result, "final", "Distance from the true position at the end, mm", 1e3, 0)
     )
-    return report.figure(caption, panels) + tables
+    return reporting.figure(caption, panels) + tables
 
 
-def _error_table(result: Result, name: str, caption: str, factor: float, digits: int) -> str:
+def _error_table(result: ClusteringStudy, name: str, caption: str, factor: float, digits: int) -> str:
     cells = {mode: _of(result.error(mode, name)) for mode in MODES}
     rows = [
         ["" if m else trajectory, method, *(cells[mode][t][m].text(digits, factor) for mode in MODES)]
         for t, trajectory in enumerate(TRAJECTORIES)
         for m, method in enumerate(NAMES)
     ]
-    return report.table(caption, ("trajectory", "method", *WORDS.values()), rows, texts=2)
+    return reporting.table(caption, ("trajectory", "method", *WORDS.values()), rows, texts=2)
 
 
-def figure5(result: Result) -> str:
+def figure5(result: ClusteringStudy) -> str:
     """Clusters by k-means where odometry alone puts them."""
     design, method = result.design, "kmeans"
     drive, track = simulate(design, 0, TRAJECTORIES[-1]), _track(result, TRAJECTORIES[-1], method, "without")
     last, scan = drive.truth[-1], drive.scans[-1]
     angles = last[2] + np.linspace(-0.5, 0.5, 60) * design.field_of_view
-    reach = last[:2] + design.max_range * np.column_stack([np.cos(angles), np.sin(angles)])
-    points, _, _ = to_world(track.poses[-1], scan.xy[scan.valid])
+    reach = last[:2] + design.max_range * unit_vectors(angles)
+    points = act(track.poses[-1], scan.xy[scan.valid])
     map_ = Map(
         "Clusters by k-means without the filter",
         (*_BOX[:1], 30.0, -9.0, 9.0),
@@ -129,10 +137,10 @@ def figure5(result: Result) -> str:
         ("reference", "var(--soft)"), ("estimated path", "var(--estimate)"), ("clusters", "var(--m0)"),
         ("lidar points at the end", "var(--lilac)"), ("objects seen at the end", "var(--seen)"),
     ]  # fmt: skip
-    return report.figure(caption, [("", chart(map_, width=900))], legend)
+    return reporting.figure(caption, [("", chart(map_, width=900))], legend)
 
 
-def figure6(result: Result) -> str:
+def figure6(result: ClusteringStudy) -> str:
     """Every drive of the first run: a map for each trajectory, method and mode."""
     design, blocks = result.design, []
     for trajectory in TRAJECTORIES:
@@ -152,7 +160,7 @@ def figure6(result: Result) -> str:
             ("reference, which is the true path", "var(--soft)"), ("estimated path", "var(--estimate)"),
             ("while objects are lost", "var(--lost)"), ("clusters or landmarks, 95 %", "var(--m0)"),
         ]  # fmt: skip
-        blocks.append(report.figure(caption, panels, legend))
+        blocks.append(reporting.figure(caption, panels, legend))
     return "".join(blocks)
 
 
@@ -172,7 +180,7 @@ def _ellipses(track: Track, scans: int) -> list[tuple[str, Array, Array]]:
     return [("", track.landmarks[chosen], track.landmark_covariances[chosen])]
 
 
-def _track(result: Result, trajectory: str, method: str, mode: str) -> Track:
+def _track(result: ClusteringStudy, trajectory: str, method: str, mode: str) -> Track:
     """Of the first run."""
     outcome = next(o for o in result.outcomes if (o.run, o.trajectory, o.method) == (0, trajectory, method))
     return outcome.tracks[mode]

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lidarcore import reporting
 from lidarcore.evaluation.intervals import mean
-from lidarcore.experiments import report
-from lidarcore.experiments.clustering_ekf import MODES, TRAJECTORIES, Design, Result
+from lidarcore.experiments.clustering_ekf import MODES, TRAJECTORIES, ClusteringStudy, Design
 from lidarcore.experiments.clustering_ekf_claims import claims
 from lidarcore.experiments.clustering_ekf_figures import NAMES, WORDS, figure3, figure4, figure5, figure6
 from lidarcore.simulation.robot import RATE
@@ -14,7 +14,7 @@ from lidarcore.simulation.robot import RATE
 TITLE = "Clusters of lidar points as landmarks, with and without a Kalman filter"
 
 
-def html(result: Result) -> str:
+def html(result: ClusteringStudy) -> str:
     """The report as one page that needs nothing else."""
     design = result.design
     lead = (
@@ -26,16 +26,16 @@ def html(result: Result) -> str:
     sections = [
         (
             "What the paper says and what came out",
-            report.verdicts(claims(result)) + report.paragraphs(*_why(design)),
+            reporting.verdicts(claims(result)) + reporting.paragraphs(*_why(design)),
         ),
         ("Run time (figure 3)", figure3(result)),
         ("Accumulated error (figure 4)", figure4(result)),
         ("Without the filter (figure 5)", figure5(result)),
         ("All drives of the first run (figure 6)", figure6(result)),
         ("Is the filter's covariance true?", _consistency(result)),
-        ("What is simulated", report.bullets(_set_up(design))),
+        ("What is simulated", reporting.bullets(_set_up(design))),
     ]
-    return report.page(TITLE, lead, sections)
+    return reporting.page(TITLE, lead, sections)
 
 
 def _why(design: Design) -> list[str]:
@@ -78,7 +78,7 @@ def _set_up(design: Design) -> list[str]:
     ]
 
 
-def _consistency(result: Result) -> str:
+def _consistency(result: ClusteringStudy) -> str:
     rows: Sequence[Sequence[str]] = [
         [
             name,
@@ -97,5 +97,5 @@ def _consistency(result: Result) -> str:
         "it as the robot passes. The covariance of the members, which the paper uses, gives each sighting room for "
         "that, but the filter takes errors of successive sightings as independent, and they are not."
     )
-    table = report.table("Normalised squared error of the pose, and what was found", headers, rows)
-    return report.paragraphs(text) + table
+    table = reporting.table("Normalised squared error of the pose, and what was found", headers, rows)
+    return reporting.paragraphs(text) + table

@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.consistency_design import KINDS
-from lidarcore.evaluation.intervals import Interval, ratio, share
-from lidarcore.evaluation.places import Place
-from lidarcore.evaluation.trials import Segmentation, Trials, simulate
+from lidarcore.evaluation.consistency.design import KINDS
+from lidarcore.evaluation.consistency.trials import Segmentation, Trials, simulate
+from lidarcore.evaluation.intervals import LEVEL, Interval, ratio, share
+from lidarcore.evaluation.repeatability.places import Place
 from lidarcore.extraction import compare
 from lidarcore.features import Corners
+from lidarcore.geometry import contains
 from lidarcore.lines import FITTERS
 from lidarcore.scan import Array, Ints, Scan
 from lidarcore.settings import Covariance, ExtractionSettings
 
 LEAST_SCANS = 10
 SAME = 0.2  # m, a corner farther than this from where it was in the first scan is another
-_GATE = -2 * np.log(0.05)  # chi-square, 2 degrees of freedom, 95 %
 Method = tuple[str, Covariance]
 
 
@@ -112,7 +112,7 @@ class CornerStudy:
         found = np.isfinite(trials.errors[..., 0])
         e, c = trials.errors[found], trials.covariances[found]
         within = np.zeros(found.shape)
-        within[found] = np.einsum("ni,ni->n", e, np.linalg.solve(c, e[..., None])[..., 0]) <= _GATE
+        within[found] = contains(e, c, LEVEL)
         return share(within.sum(0), found.sum(0).astype(float))
 
     def bias(self, fitter: str) -> float:

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from lidarcore.evaluation.consistency_design import KINDS
+from lidarcore import reporting
+from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.experiments import report
 from lidarcore.experiments.corner_study import CornerStudy
 from lidarcore.experiments.environments import Environment
-from lidarcore.experiments.figures import Map, chart
 from lidarcore.lines import FITTERS
+from lidarcore.reporting import Map, chart
 from lidarcore.scan import Array
 
 SCALE = 10  # of the ellipses in maps, as in [WCTLS, Fig. 3]
@@ -36,7 +36,7 @@ def sigmas(environment: Environment, fitters: Sequence[str], caption: str) -> st
         [number, *(f"{value:.1f}" for value in row)]
         for number, row in zip([*numbers, "mean"], [*values, values.mean(axis=0)], strict=True)
     ]
-    return report.table(caption, headers, rows)
+    return reporting.table(caption, headers, rows)
 
 
 def honesty(environment: Environment, fitters: Sequence[str], caption: str) -> str:
@@ -63,7 +63,7 @@ def honesty(environment: Environment, fitters: Sequence[str], caption: str) -> s
         "in the published 95 % ellipse, %", "in the consistent one, %",
         "published area, mm²", "consistent area, mm²", "true area, mm²",
     )  # fmt: skip
-    return report.table(caption, headers, rows, texts=2)
+    return reporting.table(caption, headers, rows, texts=2)
 
 
 def maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str, str]]:

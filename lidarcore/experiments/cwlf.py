@@ -20,7 +20,7 @@ PARTS = 2 * len(CWLF_ROOMS) + 1  # that `run` tells of
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class CwlfStudy:
     """All that was measured; of a recording there are environments only.
 
     times          of the chosen corner of the first room by fitter and number of measurements: figure 3
@@ -40,7 +40,7 @@ def run(
     workers: int = 1,
     recording: Sequence[Scan] | None = None,
     done: Callable[[], None] = lambda: None,
-) -> Result:
+) -> CwlfStudy:
     """The whole experiment, or with a recording what can be told of it: all but the chosen corners and the times.
 
     All but the times is the same for the same design, whatever the number of workers.
@@ -51,7 +51,7 @@ def run(
         if recording is None
         else look_at(recording, design, FITTERS)
     )
-    result = Result(
+    result = CwlfStudy(
         design, environments, *(({}, {}, {}) if recording is not None else _of_chosen_corners(design))
     )
     done()

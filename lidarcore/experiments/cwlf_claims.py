@@ -17,7 +17,7 @@ from lidarcore.experiments.claim_rules import (
     not_comparable,
     percentages,
 )
-from lidarcore.experiments.cwlf import COMPARED, MEASUREMENTS, Result
+from lidarcore.experiments.cwlf import COMPARED, MEASUREMENTS, CwlfStudy
 from lidarcore.experiments.cwlf_steps import STEPS
 from lidarcore.experiments.environments import Environment
 from lidarcore.experiments.paper_rooms import CWLF_ROOMS
@@ -31,7 +31,7 @@ FALLS = ((30, 15), (78, 68))
 """%, by which CWLF's sigmas of x and y are smaller for the chosen corners, figures 4 and 5."""
 
 
-def claims(result: Result) -> list[Claim]:
+def claims(result: CwlfStudy) -> list[Claim]:
     """The paper's claims in its order; those on its own rooms and on times only where they were simulated."""
     found: list[Claim] = []
     for number, environment in enumerate(result.environments):
@@ -105,7 +105,7 @@ def _of_accuracy(environment: Environment) -> Claim:
     )
 
 
-def _of_realism(environment: Environment, result: Result) -> Claim:
+def _of_realism(environment: Environment, result: CwlfStudy) -> Claim:
     study = environment.study
     cwlf, other = (study.coverage(name, "published") for name in ("cwlf", "arras_siegwart"))
     bound = "" if study.bounds is None else (
@@ -125,7 +125,7 @@ def _of_realism(environment: Environment, result: Result) -> Claim:
     )  # fmt: skip
 
 
-def _of_times(result: Result) -> Iterator[Claim]:
+def _of_times(result: CwlfStudy) -> Iterator[Claim]:
     totals = {key: times.total for key, times in result.times.items()}
     ratios = [totals["cwlf", n] / totals["arras_siegwart", n] for n in MEASUREMENTS]
     library = {name: result.times[name, 90].library for name in ("arras_siegwart", "cwlf")}
@@ -150,7 +150,7 @@ def _of_times(result: Result) -> Iterator[Claim]:
     )
 
 
-def _of_steps(result: Result) -> Iterator[Claim]:
+def _of_steps(result: CwlfStudy) -> Iterator[Claim]:
     for fitter, title, step, paper in (("arras_siegwart", "Arras-Siegwart", 1, 70), ("cwlf", "CWLF", 0, 60)):
         cells = [result.step_times[room.name, fitter, n] for room in CWLF_ROOMS for n in COMPARED]
         shares = [100 * times.steps[step] / times.total for times in cells]
@@ -163,7 +163,7 @@ def _of_steps(result: Result) -> Iterator[Claim]:
         )
 
 
-def _of_chosen_corners(result: Result) -> Iterator[Claim]:
+def _of_chosen_corners(result: CwlfStudy) -> Iterator[Claim]:
     for room, paper in zip(CWLF_ROOMS, FALLS, strict=True):
         published, scatter = (_falls(result, room.name, of) for of in ("published", "scatter"))
         yield judged(
@@ -177,7 +177,7 @@ def _of_chosen_corners(result: Result) -> Iterator[Claim]:
         )
 
 
-def _of_number(result: Result) -> Claim:
+def _of_number(result: CwlfStudy) -> Claim:
     few, many = (
         np.array([u.scatter for (_, _, n), u in result.uncertainties.items() if n == number])
         for number in COMPARED
@@ -191,7 +191,7 @@ def _of_number(result: Result) -> Claim:
     )
 
 
-def _falls(result: Result, room: str, of: str) -> Array:
+def _falls(result: CwlfStudy, room: str, of: str) -> Array:
     """%, of the standard deviations of x and y from Arras-Siegwart to CWLF, both numbers of measurements together."""
     ratios: Array = np.mean(
         [

@@ -2,17 +2,16 @@
 
 import numpy as np
 
-from lidarcore.experiments import report
+from lidarcore import reporting
 from lidarcore.experiments.corner_study import CornerStudy
 from lidarcore.experiments.corner_tables import SCALE, heading, honesty, legend, maps, sigmas
-from lidarcore.experiments.cwlf import COMPARED, FITTERS, MEASUREMENTS, Result
+from lidarcore.experiments.cwlf import COMPARED, FITTERS, MEASUREMENTS, CwlfStudy
 from lidarcore.experiments.cwlf_claims import claims
 from lidarcore.experiments.cwlf_steps import STEPS
 from lidarcore.experiments.environments import Environment, of_verdicts, set_up
-from lidarcore.experiments.figures import Bar, bars
 from lidarcore.experiments.paper_rooms import CWLF_ROOMS
-from lidarcore.experiments.plots import curves
 from lidarcore.lines import FITTERS as ALL
+from lidarcore.reporting import Bar, bars, curves
 
 TITLE = "Corners by conditional weighted linear fitting, and by Arras and Siegwart"
 STYLES = {"arras_siegwart": "m0", "cwlf": "m1"}
@@ -28,7 +27,7 @@ _CHOSEN = (
 _SHORT = {"arras_siegwart": "Arras-Siegwart", "cwlf": "CWLF"}
 
 
-def html(result: Result) -> str:
+def html(result: CwlfStudy) -> str:
     """The report as one page that needs nothing else."""
     lead = (
         "The experiment of N. Prieto-Fernández et al., “Conditional Weighted Linear Fitting for 2D-LiDAR-Mapping of "
@@ -38,7 +37,7 @@ def html(result: Result) -> str:
     sections = [
         (
             "What the paper says and what came out",
-            report.verdicts(claims(result)) + report.paragraphs(*_why(result)),
+            reporting.verdicts(claims(result)) + reporting.paragraphs(*_why(result)),
         ),
         (
             "Uncertainty of every corner (tables I and II)",
@@ -49,20 +48,20 @@ def html(result: Result) -> str:
         *(_of_chosen_corners(result) if result.times else []),
         (
             "How this was made",
-            report.bullets([*set_up(result.design, result.environments), *_methods(result)]),
+            reporting.bullets([*set_up(result.design, result.environments), *_methods(result)]),
         ),
     ]
-    return report.page(TITLE, lead, sections)
+    return reporting.page(TITLE, lead, sections)
 
 
-def _of_chosen_corners(result: Result) -> list[tuple[str, str]]:
+def _of_chosen_corners(result: CwlfStudy) -> list[tuple[str, str]]:
     return [
         ("Time against the number of measurements (figure 3)", _figure3(result)),
         ("One corner, two numbers of measurements (figures 4 and 5)", _figures45(result)),
     ]
 
 
-def _why(result: Result) -> list[str]:
+def _why(result: CwlfStudy) -> list[str]:
     known = [e.study for e in result.environments if e.study.bounds is not None]
     below = (
         f"Here its published ellipse is below the bound at {sum(s.below_bound('cwlf') for s in known)} of "
@@ -109,7 +108,7 @@ def _figure2(environment: Environment) -> str:
         f"{heading(environment)}. One-sigma ellipses, drawn {SCALE} times as large; the green dot is the "
         "sensor, corners are numbered clockwise."
     )
-    return report.figure(caption, maps(environment, STYLES), legend(STYLES))
+    return reporting.figure(caption, maps(environment, STYLES), legend(STYLES))
 
 
 def _honesty(environment: Environment) -> str:
@@ -117,7 +116,7 @@ def _honesty(environment: Environment) -> str:
     return honesty(environment, fitters, f"Coverage, errors and median ellipse areas, {environment.name}")
 
 
-def _figure3(result: Result) -> str:
+def _figure3(result: CwlfStudy) -> str:
     series = [
         (f"{STYLES[name]}{dashed}", [getattr(result.times[name, n], of) for n in MEASUREMENTS])
         for of, dashed in (("total", ""), ("library", " dashed"))
@@ -149,19 +148,21 @@ def _figure3(result: Result) -> str:
     numpy, compiled = ([f"{_SHORT[name]}, {how}" for name in FITTERS] for how in ("numpy", "compiled"))
     headers = ["measurements", *numpy, "CWLF / Arras-Siegwart", *compiled]
     panels = [("time, µs", drawn), ("CWLF over Arras-Siegwart", share)]
-    return report.figure(caption, panels, legend(STYLES)) + report.table(
+    return reporting.figure(caption, panels, legend(STYLES)) + reporting.table(
         "Time of the chosen corner, µs", headers, rows
     )
 
 
-def _figures45(result: Result) -> str:
+def _figures45(result: CwlfStudy) -> str:
     parts = []
     for number, room in zip((4, 5), CWLF_ROOMS, strict=True):
         caption = (
             f"Figure {number}. The chosen corner of {room.name}: what is published (bar), how it truly scatters "
             "(whisker's end), and the time of each step."
         )
-        parts.append(report.figure(caption, [_sigma_bars(result, room.name), _step_bars(result, room.name)]))
+        parts.append(
+            reporting.figure(caption, [_sigma_bars(result, room.name), _step_bars(result, room.name)])
+        )
     sigmas_of = [
         f"{what} {axis}" for what in ("published", "scatter", "least possible") for axis in ("σx", "σy")
     ]
@@ -181,14 +182,14 @@ def _figures45(result: Result) -> str:
     ]
     return (
         "".join(parts)
-        + report.table("Uncertainty of the chosen corners, mm", headers, rows, texts=2)
-        + report.table(
+        + reporting.table("Uncertainty of the chosen corners, mm", headers, rows, texts=2)
+        + reporting.table(
             "Time of the four steps, µs", ("room", "method", "measurements", *STEPS, "all"), times, texts=2
         )
     )
 
 
-def _sigma_bars(result: Result, room: str) -> tuple[str, str]:
+def _sigma_bars(result: CwlfStudy, room: str) -> tuple[str, str]:
     cells = {(name, n): result.uncertainties[room, name, n] for n in COMPARED for name in FITTERS}
     most = 1e3 * max(float(np.max([u.published, u.scatter])) for u in cells.values())
     least = 1e3 * min(float(np.min([u.published, u.scatter])) for u in cells.values()) / 2
@@ -208,7 +209,7 @@ def _sigma_bars(result: Result, room: str) -> tuple[str, str]:
     return "published (true), mm", bars(rows, most, least=least, title=title)
 
 
-def _step_bars(result: Result, room: str) -> tuple[str, str]:
+def _step_bars(result: CwlfStudy, room: str) -> tuple[str, str]:
     cells = {(name, n): result.step_times[room, name, n] for n in COMPARED for name in FITTERS}
     most, least = max(max(t.steps) for t in cells.values()), min(min(t.steps) for t in cells.values()) / 2
     rows: list[Bar | str] = []
@@ -221,6 +222,6 @@ def _step_bars(result: Result, room: str) -> tuple[str, str]:
     return "time of the steps, µs", bars(rows, most, least=least, title=f"Time of the four steps, {room}")
 
 
-def _methods(result: Result) -> list[str]:
+def _methods(result: CwlfStudy) -> list[str]:
     methods = f"Methods: {'; '.join(f'{ALL[name].title}: {ALL[name].reference}' for name in FITTERS)}."
     return [_CHOSEN, methods] if result.times else [methods]

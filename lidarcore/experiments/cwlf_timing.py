@@ -8,12 +8,13 @@ from functools import partial
 import numpy as np
 
 from lidarcore.corners import intersect
-from lidarcore.evaluation.cramer_rao import corner_bound
+from lidarcore.evaluation.consistency.cramer_rao import corner_bound
 from lidarcore.experiments.cwlf_steps import METHODS, Beams, corner
 from lidarcore.experiments.paper_rooms import Room
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, fit_beams
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array
+from lidarcore.tables import CORNER_FIELDS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,9 +93,9 @@ def times(name: str, walls: tuple[Beams, Beams], noise: SensorNoise, repeats: in
 
 
 def _compiled(fitter: int, walls: tuple[Beams, Beams], noise: SensorNoise) -> Array:
-    rows, out = np.empty((2, LINE_FIELDS)), np.empty(10)
+    rows, out = np.empty((2, LINE_FIELDS)), np.empty(CORNER_FIELDS)
     for row, (rho, theta) in zip(rows, walls, strict=True):
-        fit_beams(fitter, rho, theta, noise.sigma_range**2, noise.sigma_bearing**2, row)
+        fit_beams(fitter, rho, theta, noise.model(), row)
     intersect(rows[0], rows[1], out)
     return out
 

@@ -6,11 +6,12 @@ from functools import partial
 
 import numpy as np
 
-from lidarcore.evaluation.trials import SEGMENTATIONS, Segmentation
+from lidarcore.evaluation.consistency.trials import SEGMENTATIONS, Segmentation
 from lidarcore.evaluation.workers import run_all
 from lidarcore.experiments.claim_rules import RULES
 from lidarcore.experiments.corner_study import CornerStudy, recorded, simulated
 from lidarcore.experiments.paper_rooms import BEAMS, NOISE, Room
+from lidarcore.geometry import unit_vectors
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings
@@ -35,7 +36,7 @@ class Design:
     assumed: tuple[str, ...] = ("range", "bearing")
 
     def with_noise(self, sigma_range: float | None, sigma_bearing: float | None) -> "Design":
-        """The same with noise (m, rad) of a sensor; None leaves what is assumed. Raises ValueError as SensorNoise."""
+        """This design with noise (m, rad) of a sensor; None keeps its own. Raises ValueError as SensorNoise."""
         given = {"range": sigma_range, "bearing": sigma_bearing}
         noise = SensorNoise(
             self.noise.sigma_range if sigma_range is None else sigma_range,
@@ -62,7 +63,7 @@ class Design:
         return ExtractionSettings(noise=self.noise, split_threshold=self.split_threshold)
 
     def quick(self) -> "Design":
-        """The same with few scans: to try it out."""
+        """This design with few scans, to try it out."""
         return replace(self, scans=QUICK_SCANS)
 
 
@@ -92,7 +93,7 @@ def look_around(
     environments = []
     for room, known, found in zip(rooms, studies[::2], studies[1::2], strict=True):
         place = room.place(design.noise)
-        points = place.ranges[:, None] * np.column_stack([np.cos(place.bearings), np.sin(place.bearings)])
+        points = place.ranges[:, None] * unit_vectors(place.bearings)
         environments.append(Environment(room.name, room, points, known, found))
     return environments
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lidarcore.evaluation.places import Place, look, shared_ends
+from lidarcore.evaluation.repeatability.places import Place, look, shared_ends
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array
 from lidarcore.simulation.rooms import box, polygon

@@ -8,11 +8,16 @@ from typing import Protocol
 import numpy as np
 
 from lidarcore.clusters import Clusters
+from lidarcore.geometry import (
+    UncertainPose,
+    act,
+    act_jacobians,
+    pose_difference,
+    relative,
+    squared_mahalanobis,
+)
 from lidarcore.localization import LocalizationSettings, OdometryNoise, Points
-from lidarcore.localization.measurement import to_world
-from lidarcore.localization.motion_kernels import move
-from lidarcore.localization.slam import Slam
-from lidarcore.poses import compose, inverse, wrap
+from lidarcore.localization.ekf.slam import Slam
 from lidarcore.scan import Array, Scan
 from lidarcore.simulation.paths import Path
 
@@ -78,12 +83,10 @@ def measurements(clusters: Clusters) -> Points:
 
 def dead_reckoned(drive: Perceived, clusters: Sequence[Clusters], noise: OdometryNoise) -> Track:
     """By odometry alone; clusters are rotated into the world and have the covariance of the pose, too [EKF 17]."""
-    P, covariances = START, [START]
+    covariances = [START]
     for before, after in pairwise(drive.odometry):
-        u = compose(inverse(before), after)
-        _, F, G = move(before, u)
-        P = F @ P @ F.T + G @ noise.covariance(u) @ G.T
-        covariances.append(P)
+        u, last = relative(before, after), UncertainPose(before, covariances[-1])
+        covariances.append(last.compose(UncertainPose(u, noise.covariance(u))).covariance)
     placed = [
         _placed(pose, P, of_scan)
         for pose, P, of_scan in zip(drive.odometry, covariances, clusters, strict=True)
@@ -102,9 +105,9 @@ def dead_reckoned(drive: Perceived, clusters: Sequence[Clusters], noise: Odometr
 
 def _placed(pose: Array, P: Array, clusters: Clusters) -> tuple[Array, Array]:
     """Means (K, 2) m in the world and covariances (K, 2, 2): of the object's region, and of the pose."""
-    means, G_pose, R_world_sensor = to_world(pose, clusters.means)
+    G_pose, R_world_sensor = act_jacobians(pose, clusters.means)
     region = R_world_sensor @ clusters.scatters @ R_world_sensor.T
-    return means, region + G_pose @ P @ G_pose.transpose(0, 2, 1)
+    return act(pose, clusters.means), region + G_pose @ P @ G_pose.transpose(0, 2, 1)
 
 
 def filtered(drive: Perceived, clusters: Sequence[Clusters | None], settings: LocalizationSettings) -> Track:
@@ -129,10 +132,9 @@ def filtered(drive: Perceived, clusters: Sequence[Clusters | None], settings: Lo
 
 def errors(track: Track, truth: Array, path: Path) -> Errors:
     """Of a track along a path whose y is a function of its x, against the truth (N, 3)."""
-    difference = track.poses - truth
-    difference[:, 2] = wrap(difference[:, 2])
+    difference = pose_difference(track.poses, truth)
     distance = np.hypot(difference[:, 0], difference[:, 1])
-    nees = np.einsum("ni,nij,nj->n", difference, np.linalg.inv(track.covariances), difference)
+    nees = squared_mahalanobis(difference, track.covariances)
     return Errors(
         accumulated=float(off_in_y(track.poses, path).sum()),
         rms=float(np.sqrt((distance**2).mean())),

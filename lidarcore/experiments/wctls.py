@@ -23,7 +23,7 @@ PARTS = 2 * len(WCTLS_ROOMS) + 1  # that `run` tells of
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class WctlsStudy:
     """All that was measured.
 
     times   µs, of one compiled line fit with both covariances, by fitter and number of points; of a recording none
@@ -39,7 +39,7 @@ def run(
     workers: int = 1,
     recording: Sequence[Scan] | None = None,
     done: Callable[[], None] = lambda: None,
-) -> Result:
+) -> WctlsStudy:
     """The whole experiment, with a recording in place of the rooms, if one is given.
 
     All but the times is the same for the same design, whatever the number of workers.
@@ -52,7 +52,7 @@ def run(
     )
     points = POINTS if recording is None else ()
     times = {(name, n): _time_of_fit(name, design.noise, n) for name in FITTERS for n in points}
-    result = Result(design, environments, times)
+    result = WctlsStudy(design, environments, times)
     done()
     return result
 
@@ -63,8 +63,7 @@ def _time_of_fit(fitter: str, noise: SensorNoise, points: int) -> float:
     ranges, row = 2 / np.cos(bearings), np.empty(LINE_FIELDS)
 
     def fit() -> int:
-        variances = noise.sigma_range**2, noise.sigma_bearing**2
-        return fit_beams(FITTER_IDS[fitter], ranges, bearings, *variances, row)
+        return fit_beams(FITTER_IDS[fitter], ranges, bearings, noise.model(), row)
 
     fit()
     return 1e6 * min(timeit.repeat(fit, number=100, repeat=20)) / 100

@@ -21,7 +21,7 @@ from lidarcore.experiments.claim_rules import (
     within,
 )
 from lidarcore.experiments.environments import Environment
-from lidarcore.experiments.wctls import FITTERS, POINTS, Result
+from lidarcore.experiments.wctls import FITTERS, POINTS, WctlsStudy
 
 AREAS = (
     ((4498.5, 330.3), (4594.7, 355.0), (626.2, 178.7)),
@@ -38,7 +38,7 @@ _ANGLES = (
 )
 
 
-def claims(result: Result) -> list[Claim]:
+def claims(result: WctlsStudy) -> list[Claim]:
     """The paper's claims in its order; those on its own rooms and on times only where they were simulated."""
     found: list[Claim] = []
     for number, environment in enumerate(result.environments):
@@ -46,7 +46,7 @@ def claims(result: Result) -> list[Claim]:
     return [*found, _of_time(result)] if result.times else found
 
 
-def _of_room(environment: Environment, number: int | None, result: Result) -> Iterator[Claim]:
+def _of_room(environment: Environment, number: int | None, result: WctlsStudy) -> Iterator[Claim]:
     yield _of_places(environment)
     yield _of_weights(environment)
     yield _of_factors(environment, number)
@@ -138,7 +138,7 @@ def _of_dispersion(environment: Environment, number: int | None) -> Claim:
     )
 
 
-def _of_reliability(environment: Environment, result: Result) -> Claim:
+def _of_reliability(environment: Environment, result: WctlsStudy) -> Claim:
     study = environment.study
     wctls, utls = (study.coverage(name, "published") for name in ("wctls", "utls"))
     bound = "" if study.bounds is None else (
@@ -172,7 +172,7 @@ def _of_gain(environment: Environment) -> Claim:
     )
 
 
-def _of_time(result: Result) -> Claim:
+def _of_time(result: WctlsStudy) -> Claim:
     few, many = POINTS
     growth = {name: result.times[name, many] / result.times[name, few] for name in FITTERS}
     times = ", ".join(

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from lidarcore.evaluation.consistency_design import KINDS
-from lidarcore.experiments import report
+from lidarcore import reporting
+from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.experiments.corner_tables import SCALE, heading, honesty, legend, maps, sigmas
 from lidarcore.experiments.environments import Environment, of_verdicts, set_up
-from lidarcore.experiments.plots import boxes
-from lidarcore.experiments.wctls import FITTERS, Result
+from lidarcore.experiments.wctls import FITTERS, WctlsStudy
 from lidarcore.experiments.wctls_claims import AREAS, claims
 from lidarcore.lines import FITTERS as ALL
+from lidarcore.reporting import boxes
 
 TITLE = "Corners by weighted conformal total least squares"
 STYLES = {"utls": "m0", "wtls": "m2", "wctls": "m3"}
@@ -22,7 +22,7 @@ _OF_ROOMS = (
 )
 
 
-def html(result: Result) -> str:
+def html(result: WctlsStudy) -> str:
     """The report as one page that needs nothing else."""
     lead = (
         "The experiment of N. Prieto-Fernández et al., “Enhancement of the Total Least Squares Method for Feature "
@@ -33,18 +33,18 @@ def html(result: Result) -> str:
     sections = [
         (
             "What the paper says and what came out",
-            report.verdicts(claims(result)) + report.paragraphs(*_why(result)),
+            reporting.verdicts(claims(result)) + reporting.paragraphs(*_why(result)),
         ),
         ("Uncertainty of every corner (tables 1 and 2)", "".join(map(_table, (1, 2), result.environments))),
         ("The ellipses (figure 3)", "".join(map(_figure3, result.environments))),
         ("Median ellipse area of each scan (figure 4)", _figure4(result)),
         ("Can the ellipses be believed?", "".join(map(_honesty, result.environments))),
-        ("How this was made", report.bullets([*set_up(result.design, result.environments), *_methods()])),
+        ("How this was made", reporting.bullets([*set_up(result.design, result.environments), *_methods()])),
     ]
-    return report.page(TITLE, lead, sections)
+    return reporting.page(TITLE, lead, sections)
 
 
-def _why(result: Result) -> list[str]:
+def _why(result: WctlsStudy) -> list[str]:
     known = [e.study for e in result.environments if e.study.bounds is not None]
     below = (
         f" Here it is below it at {sum(s.below_bound('wctls') for s in known)} of "
@@ -77,10 +77,10 @@ def _figure3(environment: Environment) -> str:
         f"Figure 3. {heading(environment)}. One-sigma ellipses, drawn {SCALE} times as large, as in the paper; "
         "the green dot is the sensor, corners are numbered clockwise."
     )
-    return report.figure(caption, maps(environment, STYLES), legend(STYLES))
+    return reporting.figure(caption, maps(environment, STYLES), legend(STYLES))
 
 
-def _figure4(result: Result) -> str:
+def _figure4(result: WctlsStudy) -> str:
     panels, rows = [], []
     for number, environment in enumerate(result.environments):
         study = environment.study
@@ -105,10 +105,10 @@ def _figure4(result: Result) -> str:
         "whiskers of 1.5 times the interquartile range, outliers. Dashed: the true area, the median over the corners."
     )
     headers = ("room", "method", "the paper", "published", "consistent", "true area")
-    table = report.table(
+    table = reporting.table(
         "Median ellipse area per scan ± standard deviation over scans, mm²", headers, rows, texts=2
     )
-    return report.figure(caption, panels, legend(STYLES)) + table
+    return reporting.figure(caption, panels, legend(STYLES)) + table
 
 
 def _honesty(environment: Environment) -> str:

@@ -2,7 +2,7 @@
 
 from lidarcore.landmarks.atlas import Atlas, Session
 from lidarcore.landmarks.exchange import FORMATS, export_map, import_map, read_landmarks, write_landmarks
-from lidarcore.landmarks.landmark import Landmark
+from lidarcore.landmarks.landmark import MAX_COORDINATE, MAX_ID, Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
 from lidarcore.landmarks.nearest import Metric, Neighbour
 from lidarcore.landmarks.picture import export_picture
@@ -10,6 +10,8 @@ from lidarcore.landmarks.queries import Box, Circle, Filter, Page
 
 __all__ = [
     "FORMATS",
+    "MAX_COORDINATE",
+    "MAX_ID",
     "Atlas",
     "Box",
     "Circle",

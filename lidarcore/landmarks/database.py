@@ -9,11 +9,12 @@ the fourth, since a tree over nodes without extent would not know how to split t
 import sqlite3
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from threading import Lock
 
 from lidarcore.errors import LandmarkError, LandmarkMapError
+from lidarcore.foreign_database import MOST_BYTES
 
 UNIT = "m"
 _APPLICATION = 0x4C4D4150  # "LMAP", in the header of the file
@@ -134,15 +135,20 @@ class Database:
             connection = sqlite3.connect(
                 self.path, self._patience, isolation_level=None, check_same_thread=False
             )
+            connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_BYTES)
+            connection.execute("PRAGMA trusted_schema = OFF")
             connection.execute("PRAGMA synchronous = FULL")
             connection.execute("PRAGMA mmap_size = 1000000000")
             return connection
 
     def _prepare(self) -> None:
         with self.writing() as connection:
-            for version, statements in list(enumerate(_MIGRATIONS, 1))[self._version(connection) :]:
-                for statement in (*statements, f"PRAGMA user_version = {version}"):
-                    connection.execute(statement)
+            before = self._version(connection)
+            if _schema(connection) != _expected_schema(before):
+                raise LandmarkMapError(
+                    f"The tables of {self.path} are not those of a landmark map: give another path."
+                )
+            _migrate(connection, before, len(_MIGRATIONS))
             (unit,) = connection.execute("SELECT unit FROM about").fetchone()
             if unit != UNIT:
                 raise LandmarkMapError(
@@ -168,10 +174,28 @@ class Database:
     def _explained(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.Error as error:
+        except (sqlite3.Error, UnicodeDecodeError) as error:  # the latter by a damaged byte of a text
             raise LandmarkMapError(f"The landmark map {self.path} cannot be used: {error}.") from error
         except OverflowError as error:
             raise LandmarkError("A number has more than 64 bits: no id is so large.") from error
+
+
+def _migrate(connection: sqlite3.Connection, version: int, to: int) -> None:
+    for number, statements in list(enumerate(_MIGRATIONS, 1))[version:to]:
+        for statement in (*statements, f"PRAGMA user_version = {number}"):
+            connection.execute(statement)
+
+
+def _schema(connection: sqlite3.Connection) -> set[tuple[str, str, str]]:
+    query = "SELECT type, name, sql FROM sqlite_master WHERE name NOT LIKE 'sqlite@_%' ESCAPE '@'"
+    return set(connection.execute(query))
+
+
+def _expected_schema(version: int) -> set[tuple[str, str, str]]:
+    """What an honest file of this version declares: a column that computes, or a view, makes a query run for ever."""
+    with closing(sqlite3.connect(":memory:", isolation_level=None)) as empty:
+        _migrate(empty, 0, version)
+        return _schema(empty)
 
 
 def path_of(url: str | Path) -> Path:

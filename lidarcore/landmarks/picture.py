@@ -14,7 +14,9 @@ _MARGIN = 1.0  # m around the landmarks
 _MOST_PIXELS = 100_000_000
 
 
-def export_picture(landmark_map: LandmarkMap, path: str | Path, resolution: float = 0.05) -> None:
+def export_picture(
+    landmark_map: LandmarkMap, path: str | Path, resolution: float = 0.05, most_pixels: int = _MOST_PIXELS
+) -> None:
     """Write a PNG and beside it the YAML of ROS map_server: a cell that holds a landmark is occupied, others unknown.
 
     resolution is in m a pixel. Raises MapFileError for another suffix than .png, an empty map, a resolution that
@@ -29,8 +31,10 @@ def export_picture(landmark_map: LandmarkMap, path: str | Path, resolution: floa
         raise MapFileError(f"The resolution is {resolution} m: give 0.001 to 1000 m a pixel.")
     origin = np.floor((np.array([extent.x_min, extent.y_min]) - _MARGIN) / resolution) * resolution
     size = np.ceil((np.array([extent.x_max, extent.y_max]) + _MARGIN - origin) / resolution).astype(np.int64)
-    if size.prod() > _MOST_PIXELS:
-        raise MapFileError(f"The picture would have {size[0]} x {size[1]} pixels: give a coarser resolution.")
+    if size.prod() > most_pixels:
+        raise MapFileError(
+            f"The picture would have {size[0]} x {size[1]} pixels, more than {most_pixels}: give a coarser resolution."
+        )
     xy = np.array([(landmark.x, landmark.y) for landmark in landmark_map])
     column, row = np.floor((xy - origin) / resolution).astype(np.int64).T
     grey = np.full((size[1], size[0]), _UNKNOWN, np.uint8)

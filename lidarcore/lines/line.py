@@ -22,13 +22,17 @@ class Line:
     alpha                  rad, direction of the normal, in (-pi, pi]
     r                      m, distance from the sensor, >= 0
     covariance_published   (2, 2) of (alpha, r) in rad and m, by the formula of the fitter's paper
-    covariance_consistent  (2, 2), exact to first order under the noise model
+    covariance_consistent  (2, 2), exact to first order under the noise model: by how much the line found from here
+                           differs from scan to scan
+    covariance_map         (2, 2), what is not known of where the wall is: all of its unevenness, and what a sensor errs
+                           by in every scan from one place; for maps and whatever looks from several places
     """
 
     alpha: float
     r: float
     covariance_published: Array
     covariance_consistent: Array
+    covariance_map: Array
 
     @property
     def normal(self) -> Array:
@@ -40,7 +44,7 @@ class Line:
 class Lines:
     """M lines in the sensor frame; the fields of `Line`, with a leading axis.
 
-    alpha (M,) rad, r (M,) m, covariance_published and covariance_consistent (M, 2, 2);
+    alpha (M,) rad, r (M,) m, covariance_published, covariance_consistent and covariance_map (M, 2, 2);
     covariance is the one the settings ask for.
     """
 
@@ -48,6 +52,7 @@ class Lines:
     r: Array
     covariance_published: Array
     covariance_consistent: Array
+    covariance_map: Array
     covariance: Array
 
     def __len__(self) -> int:
@@ -59,6 +64,7 @@ class Lines:
             float(self.r[i]),
             self.covariance_published[i],
             self.covariance_consistent[i],
+            self.covariance_map[i],
         )
 
     def __iter__(self) -> Iterator[Line]:

@@ -1,7 +1,7 @@
-"""What all fitters share: weighted moments, and the first-order covariance of a weighted regression.
+"""What all fitters share: weighted moments, what a fit reports, and where its line goes.
 
-Kernels take one piece of a scan as arrays of ranges rho (N,) m and unit vectors (c, s) (N,) of the bearings,
-the variances v_rho (m²) and v_theta (rad²) of the noise, and a weight for each point.
+Kernels take one piece of a scan as arrays of ranges rho (N,) m and unit vectors (c, s) (N,) of the bearings, the
+noise, and a weight for each point. Published formulas know the variances v_rho (m²) and v_theta (rad²) alone.
 """
 
 import numpy as np
@@ -10,12 +10,18 @@ from lidarcore.compiled import inlined
 from lidarcore.lines.line import Array
 
 # What a fit reports.
-OK, NO_DIRECTION, THROUGH_SENSOR, NOT_FINITE = 0, 1, 2, 3
+OK, NO_DIRECTION, THROUGH_SENSOR, NOT_FINITE, NOT_CONVERGED = range(5)
+
+# A line as kernels write it: unit normal (2), r, and covariances of (alpha, r), four numbers each.
+NORMAL, DISTANCE, LINE_PUBLISHED, LINE_CONSISTENT, LINE_MAP = 0, 2, 3, 7, 11
+LINE_FIELDS = 15
 
 Moments = tuple[float, float, float, float, float, float]
 Sym2 = tuple[float, float, float]  # xx, xy, yy of a symmetric 2 x 2 matrix
 Normal = tuple[float, float, float]  # unit normal and distance r >= 0 of a line
 Fit = tuple[int, Normal, Sym2]  # status, line, published covariance of (alpha, r); the weights are left in w
+
+Work = tuple[Array, Array, Array]  # scratch (N,) each: the weights, and two for covariances
 
 NO_LINE = (0.0, 0.0, 0.0)
 
@@ -67,58 +73,15 @@ def total_least_squares(m: Moments) -> tuple[int, float, float, float]:
 
 
 @inlined
-def consistent_covariance(
-    w: Array, rho: Array, c: Array, s: Array, v_rho: float, v_theta: float, normal: Normal
-) -> Sym2:
-    """Sandwich covariance of (alpha, r) for a regression with weights w.
-
-    To first order every fitter here minimises sum w (e + dalpha t - dr)², e the distance of a point from the line
-    and t its coordinate along it; they differ by w only. With A the normal matrix and B the same sum
-    weighted by w² v, v the effective variance, the covariance is A^-1 B A^-1.
-    """
-    nx, ny, _ = normal
-    a0 = a1 = a2 = b0 = b1 = b2 = 0.0
-    middle = len(rho) // 2
-    t0 = rho[middle] * (nx * s[middle] - ny * c[middle])
-    for i in range(len(rho)):
-        across, along = nx * c[i] + ny * s[i], nx * s[i] - ny * c[i]
-        t = rho[i] * along
-        v = v_rho * across * across + v_theta * t * t
-        t -= t0
-        wwv = w[i] * w[i] * v
-        a0 += w[i]
-        a1 += w[i] * t
-        a2 += w[i] * t * t
-        b0 += wwv
-        b1 += wwv * t
-        b2 += wwv * t * t
-    mean = a1 / a0
-    d = a2 - a1 * mean  # sum of w (t - mean)^2
-    # Moments of w² v about the mean, then G = (dalpha, dr at the mean); dr at t = 0 adds mean * dalpha.
-    b2 = b2 - 2 * mean * b1 + mean * mean * b0
-    b1 = b1 - mean * b0
-    mean += t0
-    v_alpha = b2 / (d * d)
-    cov_alpha_m = -b1 / (a0 * d)
-    return (
-        v_alpha,
-        cov_alpha_m + mean * v_alpha,
-        b0 / (a0 * a0) + 2 * mean * cov_alpha_m + mean * mean * v_alpha,
-    )
-
-
-@inlined
-def store(out: Array, normal: Normal, published: Sym2, consistent: Sym2) -> int:
-    """Write a line to out: unit normal, r, and both covariances of (alpha, r); NOT_FINITE if one is not positive."""
-    out[0], out[1], out[2] = normal
-    out[3], out[4], out[5], out[6] = published[0], published[1], published[1], published[2]
-    out[7], out[8], out[9], out[10] = consistent[0], consistent[1], consistent[1], consistent[2]
-    # NaN and inf fail one of the comparisons.
-    good = (
-        published[0] > 0
-        and consistent[0] > 0
-        and np.inf > published[0] * published[2] > published[1] * published[1]
-        and np.inf > consistent[0] * consistent[2] > consistent[1] * consistent[1]
-        and normal[2] < np.inf
-    )
+def store(out: Array, normal: Normal, published: Sym2, consistent: Sym2, for_maps: Sym2) -> int:
+    """Write a line to out (LINE_FIELDS,); NOT_FINITE if it, or a covariance, is not finite and positive."""
+    out[NORMAL], out[NORMAL + 1], out[DISTANCE] = normal
+    good = normal[2] < np.inf
+    for at, (aa, ar, rr) in (
+        (LINE_PUBLISHED, published),
+        (LINE_CONSISTENT, consistent),
+        (LINE_MAP, for_maps),
+    ):
+        out[at], out[at + 1], out[at + 2], out[at + 3] = aa, ar, ar, rr
+        good &= aa > 0 and np.inf > aa * rr > ar * ar  # NaN and inf fail one of the comparisons
     return OK if good else NOT_FINITE

@@ -1,11 +1,13 @@
 """Where the sensor is: extended Kalman filters on point landmarks, in a known map or with the map in the state."""
 
-from lidarcore.localization.association import Association
-from lidarcore.localization.deskew import deskew
-from lidarcore.localization.estimate import Estimate
-from lidarcore.localization.landmarks import Landmarks
-from lidarcore.localization.localizer import Localizer
-from lidarcore.localization.navigator import Navigator
+from lidarcore.localization.dead_reckoning import Velocity
+from lidarcore.localization.deskewing import deskew
+from lidarcore.localization.ekf.association import Association
+from lidarcore.localization.ekf.estimate import Estimate, as_pose
+from lidarcore.localization.ekf.localizer import Localizer
+from lidarcore.localization.ekf.slam import Slam
+from lidarcore.localization.landmarks import Landmarks, from_stored, to_stored
+from lidarcore.localization.navigator import Navigator, warm_up
 from lidarcore.localization.points import Points
 from lidarcore.localization.posts import find_posts
 from lidarcore.localization.relocalization import Relocation, relocalize
@@ -15,10 +17,7 @@ from lidarcore.localization.settings import (
     OdometryNoise,
     VelocityNoise,
 )
-from lidarcore.localization.slam import Slam
-from lidarcore.localization.stored import from_stored, to_stored
-from lidarcore.localization.warming import warm_up
-from lidarcore.localization.whereabouts import Whereabouts
+from lidarcore.localization.tracking_result import TrackingResult
 
 __all__ = [
     "Association",
@@ -32,8 +31,10 @@ __all__ = [
     "Points",
     "Relocation",
     "Slam",
+    "TrackingResult",
+    "Velocity",
     "VelocityNoise",
-    "Whereabouts",
+    "as_pose",
     "deskew",
     "find_posts",
     "from_stored",

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from lidarcore.errors import MotionError
-from lidarcore.localization.estimate import Instant
+from lidarcore.geometry import compose, relative
+from lidarcore.localization.ekf.estimate import Instant
 from lidarcore.localization.settings import LocalizationSettings
-from lidarcore.poses import compose, inverse
 from lidarcore.scan import Array
 
 _AGREEING = (
@@ -113,7 +113,7 @@ class Continuity:
         went = np.zeros(2)
         for before, after in pairwise(self._recent):
             if before.odometry is not None and after.odometry is not None:
-                x, y, turn = compose(inverse(before.odometry), after.odometry)
+                x, y, turn = relative(before.odometry, after.odometry)
                 went += [np.hypot(x, y), np.abs(turn)]
         return went / max(self._recent[-1].stamp - self._recent[0].stamp, _PERIOD)
 

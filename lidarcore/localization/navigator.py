@@ -1,4 +1,4 @@
-"""One thing to drive: scans in, whereabouts out, in a known map or while building it."""
+"""One thing to drive: scans in, tracking results out, in a known map or while building it."""
 
 from dataclasses import replace
 
@@ -7,24 +7,31 @@ from numpy.typing import ArrayLike
 
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError, LostError, MotionError
+from lidarcore.extraction import extract
 from lidarcore.features import Features
 from lidarcore.localization.continuity import Continuity
-from lidarcore.localization.deskew import Distortion
-from lidarcore.localization.estimate import Estimate, Instant, as_pose, no_innovation
-from lidarcore.localization.filters import Filter, make_filter
-from lidarcore.localization.finding import find, is_recognisable
+from lidarcore.localization.dead_reckoning import DeadReckoning, Velocity
+from lidarcore.localization.deskewing import Distortion
+from lidarcore.localization.divergence import DivergenceCheck
+from lidarcore.localization.ekf.estimate import Estimate, Instant, as_pose, no_innovation
+from lidarcore.localization.ekf.filters import Filter, find, is_recognisable, make_filter
+from lidarcore.localization.ekf.motion import start
+from lidarcore.localization.ekf.slam import Slam
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.map_origin import MapOrigin
-from lidarcore.localization.motion import start
+from lidarcore.localization.observations import Observations
 from lidarcore.localization.points import Points
-from lidarcore.localization.reckoning import DeadReckoning, Velocity
-from lidarcore.localization.sentences import NEW_MAP, NO_ODOMETRY, OF_STATE, goes_on, left_out
 from lidarcore.localization.settings import LocalizationSettings, NavigationSettings
-from lidarcore.localization.sightings import Sightings
-from lidarcore.localization.slam import Slam
+from lidarcore.localization.tracking_result import (
+    NEW_MAP,
+    NO_ODOMETRY,
+    STATE_MESSAGES,
+    State,
+    TrackingResult,
+    goes_on,
+    left_out,
+)
 from lidarcore.localization.visibility import Visibility
-from lidarcore.localization.watch import Watch
-from lidarcore.localization.whereabouts import State, Whereabouts
 from lidarcore.scan import Array, Scan
 
 _ORIGIN = 1e-6 * np.eye(3)
@@ -36,11 +43,25 @@ _NOTHING = Landmarks.of(Points(np.empty((0, 2)), np.eye(2)))
 class Navigator:
     """Tracks T_world_sensor over scans, and finds it again when it is lost.
 
+    settings          mode "slam" builds the map, "localize" uses one that is given; what serves as landmarks
     landmarks         the map to localize in, or for SLAM to go on with; mode "localize" needs one
     pose, covariance  (3,) m, m, rad and (3, 3) of the start. Without them SLAM starts at the origin of a new map,
                       and in a known one the pose is found from the first scan that allows it
 
-    Raises LocalizationError if mode is "off", a map is missing, or pose or covariance is none.
+    Raises LocalizationError if mode is "off", a map is missing, or the pose is not finite; CovarianceError if the
+    covariance is not positive definite.
+
+    >>> import numpy as np
+    >>> from lidarcore import Scan, extract
+    >>> from lidarcore.localization import NavigationSettings, Navigator
+    >>> bearings = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    >>> ranges = 2 / np.maximum(abs(np.cos(bearings)), abs(np.sin(bearings)))
+    >>> navigator = Navigator(NavigationSettings(mode="slam"))
+    >>> for stamp in (0.0, 0.5, 1.0, 1.5, 2.0):
+    ...     scan = navigator.deskewed(Scan(ranges, bearings, stamp=stamp))
+    ...     result = navigator.step(scan, extract(scan))
+    >>> result.state, len(result.landmarks), result.estimate.covariance.shape
+    ('tracking', 4, (3, 3))
     """
 
     def __init__(
@@ -62,7 +83,7 @@ class Navigator:
         self._start: tuple[Array, Array]
         self._estimate: Estimate
         self._continuity, self._origin = Continuity(), MapOrigin()
-        self._watch, self._reckoning = Watch(), DeadReckoning()
+        self._divergence, self._reckoning = DivergenceCheck(), DeadReckoning()
         self._state: State = "starting"
         self._strayed = False  # in a gap: which landmark is which is to be made sure of first
         self._distortion = Distortion()
@@ -77,7 +98,7 @@ class Navigator:
 
     @property
     def _map(self) -> Landmarks:
-        """The same in the frame that it was begun in."""
+        """The map in the frame in which it was started, without the uncertainty of that frame in the world."""
         return self._given if self._filter is None else self._filter.map
 
     def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
@@ -91,7 +112,7 @@ class Navigator:
             self._filter.restart_clock()
         self._reckoning.place(self._estimate.pose)
         self._is_placed, self._strayed = True, False
-        self._watch.restart()
+        self._divergence.restart()
 
     def deskewed(self, scan: Scan) -> Scan:
         """The scan without the distortion by the sensor's motion, as far as that is known.
@@ -111,49 +132,49 @@ class Navigator:
         features: Features,
         clusters: Clusters | None = None,
         odometry: ArrayLike | None = None,
-    ) -> Whereabouts:
+    ) -> TrackingResult:
         """Take one scan with what was found in it; odometry is T_odom_sensor (3,), by default that of the scan.
 
         A scan whose clock went back, or whose odometry is missing, not finite or has jumped, is left out, and the
-        message says so; once a few agree with each other it goes on from the new values, or without odometry.
+        message says so; once a few agree with each other, tracking continues from the new values, or without odometry.
         Raises LocalizationError if the settings ask for clusters and there are none.
         """
-        sightings = Sightings.of(scan, features, clusters, self.settings)
+        observations = Observations.of(scan, features, clusters, self.settings)
         odometry = scan.odometry if odometry is None else odometry
         before = self._map
         try:
             now = Instant(scan.stamp, None if odometry is None else np.asarray(odometry, np.float64))
-            message = self._advance(now, sightings, scan)
+            message = self._advance(now, observations, scan)
         except LocalizationError as error:
             message = left_out(error)
-            self._estimate = self._estimate.unmoved(len(sightings.points))
+            self._estimate = self._estimate.unmoved(len(observations.points))
             self._coast()
-        return Whereabouts.of(
+        return TrackingResult.of(
             scan.stamp,
             self.mode,
             self._state,
             message,
             self._origin.estimate(self._estimate),
-            sightings.points,
+            observations.points,
             before,
             self.landmarks,
             self._reckoning.pose,
         )
 
-    def _advance(self, now: Instant, sightings: Sightings, scan: Scan) -> str | None:
+    def _advance(self, now: Instant, observations: Observations, scan: Scan) -> str | None:
         """Step the filter, across a break of clock or odometry if need be; what is to be said about it."""
         running, message = self._running(now), None
         if (hidden := self._continuity.hidden(now, running.settings)) is not None:
             running.displace(np.zeros(3), hidden)
             self._strayed |= bool(np.trace(hidden[:2, :2]) > _STRAY**2) and is_recognisable(running)
-        if not self._is_placed and (trouble := self._find(running, sightings.points)):
-            pose, seen = self._estimate.pose, len(sightings.points)
+        if not self._is_placed and (trouble := self._find(running, observations.points)):
+            pose, seen = self._estimate.pose, len(observations.points)
             self._estimate = Estimate(now.stamp, pose, _NOWHERE, None, no_innovation(seen))
             self._reckoning.carry(now, pose)
             return trouble
         try:
             self._continuity.check(now)
-            estimate = self._estimated(running, now, sightings, scan)
+            estimate = self._estimated(running, now, observations, scan)
         except MotionError as error:
             bridge = self._continuity.reject(now, running.settings)
             if bridge is None:
@@ -161,7 +182,7 @@ class Navigator:
             running.displace(bridge.increment, bridge.covariance)
             running.restart_clock()
             self._reckoning.interrupt()
-            estimate = self._estimated(running, now, sightings, scan)
+            estimate = self._estimated(running, now, observations, scan)
             message = goes_on(error)
         self._continuity.accept(now)
         self._reckoning.carry(now, estimate.pose)
@@ -189,12 +210,12 @@ class Navigator:
             self._reckoning.interrupt()
             self._reckoning.place(pose)
         self._is_placed, self._state = True, "tracking"
-        self._watch.restart()
+        self._divergence.restart()
         return None
 
-    def _estimated(self, running: Filter, now: Instant, sightings: Sightings, scan: Scan) -> Estimate:
+    def _estimated(self, running: Filter, now: Instant, observations: Observations, scan: Scan) -> Estimate:
         """One step of the filter with what was seen, as it was seen."""
-        points, times = sightings.points, sightings.times
+        points, times = observations.points, observations.times
         if running.settings.motion == "odometry" and scan.beam_times is not None and not self._velocity(scan):
             points, times = points.none(), None  # who knows how distorted they are
         if self._strayed:
@@ -218,19 +239,19 @@ class Navigator:
 
     def _judge(self, running: Filter) -> str | None:
         """Set the state after a step; what is to be said about it."""
-        state = self._watch.judge(self._estimate, running.is_at_odds)
+        state = self._divergence.judge(self._estimate, running.is_at_odds)
         if state == "lost" and isinstance(running, Slam) and not is_recognisable(running):
             self._origin = MapOrigin(self._estimate.pose, self._origin.estimate(self._estimate).covariance)
             running.start_over(self._estimate.pose, _ORIGIN)
             self._estimate = replace(self._estimate, covariance=_ORIGIN)
-            self._watch.restart()
+            self._divergence.restart()
             self._state = "starting"
             return NEW_MAP
         if self._state == "starting" and not running.map.confirmed.any():
             return None
         self._state = state
         self._is_placed = state != "lost"
-        return OF_STATE.get(state)
+        return STATE_MESSAGES.get(state)
 
     def _coast(self) -> None:
         """After too many scans that were left out: who knows where the sensor goes meanwhile."""
@@ -259,3 +280,26 @@ class Navigator:
     def _set_start(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         self._start = start(as_pose(pose, "pose"), covariance, LocalizationSettings(), 3)
         self._estimate = Estimate(0.0, *self._start, None, no_innovation(0))
+
+
+_SCANS, _PERIOD = 8, 0.5  # enough, and long enough, that landmarks are confirmed
+
+
+def warm_up() -> None:
+    """Compile every kernel, or load it from the cache: seconds the first time, so do it before the first scan."""
+    bearings = np.linspace(-np.pi, np.pi, 200, endpoint=False)
+    ranges = 1 / np.maximum(np.abs(np.cos(bearings)), np.abs(np.sin(bearings)))
+    square = Scan(ranges, bearings, beam_times=np.linspace(0, 0.1, 200))
+    for odometry in (None, np.zeros(3)):
+        built = _run(Navigator(NavigationSettings(mode="slam")), square, odometry)
+        _run(Navigator(NavigationSettings(mode="localize"), built.landmarks), square, odometry)
+    far = 100.0 + np.stack(np.meshgrid(np.arange(10.0), np.arange(20.0)), -1).reshape(-1, 2)
+    large = Points(far, 1e-4 * np.eye(2))
+    _run(Navigator(NavigationSettings(mode="slam"), large, np.zeros(3), 1e-6 * np.eye(3)), square, None)
+
+
+def _run(navigator: Navigator, scan: Scan, odometry: Array | None) -> Navigator:
+    for number in range(_SCANS):
+        here = navigator.deskewed(replace(scan, stamp=number * _PERIOD, odometry=odometry))
+        navigator.step(here, extract(here))
+    return navigator

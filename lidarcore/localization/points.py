@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from lidarcore.clusters import Clusters
-from lidarcore.errors import CovarianceError, LocalizationError
+from lidarcore.errors import LocalizationError
 from lidarcore.features import Corners
+from lidarcore.geometry import check_covariance, largest_variance
 from lidarcore.scan import Array, Ints
 
 
@@ -73,12 +74,12 @@ class Points:
         return self.subset(np.empty(0, np.int64))
 
     def blurred(self, sigma: float | Array) -> Self:
-        """The same with a further independent error of this standard deviation, m, for all or for each (K,)."""
+        """These points with a further independent error of this standard deviation, m, for all or for each (K,)."""
         blur = np.square(sigma)[..., None, None] * np.eye(2)
         return self.with_new(self.xy, self.covariance + blur)
 
     def scaled(self, factor: float) -> Self:
-        """The same with covariances so many times as large."""
+        """These points with covariances so many times as large."""
         return self.with_new(self.xy, factor * self.covariance)
 
     @classmethod
@@ -107,24 +108,6 @@ class Points:
 
 def widths(clusters: Clusters) -> Array:
     """How wide each cluster (K,) is, m: the length of a line whose points scatter as much."""
-    scatter = np.linalg.eigvalsh(clusters.scatters)[:, -1] if len(clusters) else np.empty(0)
-    width: Array = np.sqrt(12 * np.maximum(scatter, 0.0))
+    scatter = np.maximum(largest_variance(clusters.scatters), 0.0) if len(clusters) else np.empty(0)
+    width: Array = np.sqrt(12 * scatter)
     return width
-
-
-def check_covariance(matrices: ArrayLike, name: str) -> None:
-    """Raise CovarianceError unless the matrices (..., n, n) are finite, symmetric and positive definite."""
-    C = np.asarray(matrices, np.float64)
-    if not np.isfinite(C).all():
-        raise CovarianceError(
-            f"{name} is not finite: leave the measurement out, or give its true covariance."
-        )
-    transposed = np.swapaxes(C, -1, -2)
-    if C.size and np.abs(C - transposed).max() > 1e-9 * np.abs(C).max():
-        raise CovarianceError(f"{name} is not symmetric: give (C + C^T) / 2.")
-    try:
-        np.linalg.cholesky(C)
-    except np.linalg.LinAlgError as error:
-        raise CovarianceError(
-            f"{name} is singular or not positive: nothing is known exactly, give the variances it has."
-        ) from error

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lidarcore.geometry import unit_vectors
 from lidarcore.localization.points import Points
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Ints, Scan
@@ -30,7 +31,7 @@ def fit_circle(
     ranges: Array, bearings: Array, radius: float, noise: SensorNoise
 ) -> tuple[Array, Array] | None:
     """Centre (2,) m and its covariance (2, 2) of a circle of known radius; None if the ranges do not fit one."""
-    u = np.stack([np.cos(bearings), np.sin(bearings)], -1)
+    u = unit_vectors(bearings)
     middle = len(ranges) // 2
     centre = (ranges[middle] + radius) * u[middle]
     across = np.stack([-u[:, 1], u[:, 0]], -1)

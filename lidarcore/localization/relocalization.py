@@ -11,9 +11,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from lidarcore.errors import LostError
-from lidarcore.localization.measurement import rotation, to_sensor
+from lidarcore.geometry import (
+    act,
+    act_inverse,
+    act_inverse_jacobians,
+    pose_difference,
+    squared_mahalanobis,
+    wrap,
+)
 from lidarcore.localization.points import Points
-from lidarcore.poses import wrap
 from lidarcore.scan import Array, Ints
 
 _FAR = 6.0  # standard deviations; what is known of a pose after a gap is rough
@@ -73,17 +79,14 @@ def relocalize(
     if len(found) > 1 and len(found[1].pairs) == len(found[0].pairs):
         raise LostError(
             f"Several poses explain {len(found[0].pairs)} of the {len(observed)} points seen, such as "
-            f"{found[0].pose.round(2)} and {found[1].pose.round(2)}: move on, or say where the sensor is."
+            f"{found[0].pose.round(2)} and {found[1].pose.round(2)}: move the sensor, or set the pose by hand."
         )
     return found[0]
 
 
 def _are_near(poses: Array, pose: Array, covariance: Array) -> NDArray[np.bool_]:
     """(H,) true for the poses within _FAR standard deviations of a pose."""
-    away = poses - pose
-    away[:, 2] = wrap(away[:, 2])
-    squared: Array = np.einsum("hi,ij,hj->h", away, np.linalg.inv(covariance), away)
-    return squared < _FAR**2
+    return np.asarray(squared_mahalanobis(pose_difference(poses, pose), covariance) < _FAR**2)
 
 
 def _check(observed: Points, landmarks: Points, needed: int) -> None:
@@ -91,13 +94,13 @@ def _check(observed: Points, landmarks: Points, needed: int) -> None:
     if len(landmarks) < needed:
         raise LostError(
             f"The map has {len(landmarks)} landmarks, and {needed} are needed to find a pose in it: "
-            "say where the sensor is, or map more."
+            "set the pose by hand, or map more of the room."
         )
     seen, known = set(np.asarray(observed.kinds).tolist()), set(np.asarray(landmarks.kinds).tolist())
     if seen and not seen & known:
         raise LostError(
             f"The map holds no {' or '.join(sorted(seen))} but {', '.join(sorted(known))}: "
-            "take those for landmarks, or give another map."
+            "use those as landmarks, or give another map."
         )
 
 
@@ -170,7 +173,7 @@ def _nearest(
 
 def _pairs(pose: Array, observed: Points, landmarks: Points, tree: cKDTree) -> Ints:
     """(P, 2) one-to-one pairs of observations and landmarks that lie within each other's reach."""
-    nearest, close = _nearest(pose[:2] + observed.xy @ rotation(pose[2]).T, observed, landmarks, tree)
+    nearest, close = _nearest(act(pose, observed.xy), observed, landmarks, tree)
     _, once = np.unique(nearest[close], return_index=True)
     rows = np.flatnonzero(close)[np.sort(once)]
     return np.stack([rows, nearest[rows]], -1)
@@ -183,7 +186,7 @@ def _refine(pose: Array, observed: Points, landmarks: Points, tree: cKDTree) -> 
         if len(pairs) < 2:
             return None
         i, j = pairs.T
-        z, H, R = to_sensor(pose, landmarks.xy[j])
+        z, (H, R) = act_inverse(pose, landmarks.xy[j]), act_inverse_jacobians(pose, landmarks.xy[j])
         weights = np.linalg.inv(observed.covariance[i] + R @ landmarks.covariance[j] @ R.T)
         information = np.einsum("pki,pkl,plj->ij", H, weights, H)
         pose = pose + np.linalg.solve(information, np.einsum("pki,pkl,pl->i", H, weights, observed.xy[i] - z))
@@ -193,11 +196,10 @@ def _refine(pose: Array, observed: Points, landmarks: Points, tree: cKDTree) -> 
 
 def _unexplained(min_pairs: int, observed: Points) -> LostError:
     return LostError(
-        f"No pose explains {min_pairs} of the {len(observed)} points seen: move on and try again."
+        f"The pose was not found: of {len(observed)} points seen, too few match the map ({min_pairs} are needed). "
+        "Move the sensor and try again."
     )
 
 
 def _same(pose: Array, other: Array) -> bool:
-    difference = pose - other
-    difference[2] = wrap(difference[2])
-    return bool((np.abs(difference) < _SAME).all())
+    return bool((np.abs(pose_difference(pose, other)) < _SAME).all())

@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field, model_validator
 from pydantic.dataclasses import dataclass
 
 from lidarcore.fields import number
-from lidarcore.localization.kernels import odometry_variances
+from lidarcore.localization.ekf.kernels import odometry_variances
 from lidarcore.scan import Array
 
 _CONFIG = ConfigDict(extra="forbid")
@@ -31,10 +31,10 @@ class OdometryNoise:
     ] = 0.01
     unseen: Annotated[
         float,
-        number(0, 1, "m/√s", "standard deviation of the position after a second that wheels do not tell of"),
+        number(0, 1, "m/√s", "drift of the position per root second that odometry does not report"),
     ] = 0.002
     unseen_turn: Annotated[
-        float, number(0, 1, "rad/√s", "standard deviation of the heading after a second, the same")
+        float, number(0, 1, "rad/√s", "drift of the heading per root second that odometry does not report")
     ] = 0.002
 
     @property

@@ -10,10 +10,17 @@ from importlib import import_module
 from pathlib import Path
 
 from lidarcore.errors import RecordingError
+from lidarcore.files.streams import read_head
 from lidarcore.recordings.base import Recording
-from lidarcore.recordings.streams import read_head
+from lidarcore.recordings.writer import ELLIPSE_SCALE, RecordingWriter
 
-__all__ = ["FORMATS", "Recording", "open_recording"]
+__all__ = [
+    "ELLIPSE_SCALE",
+    "FORMATS",
+    "Recording",
+    "RecordingWriter",
+    "open_recording",
+]
 
 
 def _formats() -> tuple[type[Recording], ...]:
@@ -34,7 +41,19 @@ FORMATS: tuple[type[Recording], ...] = _formats()
 def open_recording(path: str | os.PathLike[str], topic: str | None = None) -> Recording:
     """Open a recording of any known format, also packed with gzip or zstd. Content decides, not the name.
 
-    `topic` chooses one of several lidars in the file.
+    path   a file, or the folder of a ROS 2 bag
+    topic  one of several lidars in the file; needed only if there are several
+
+    Returns a `Recording`: iterate over it for its scans, as often as you like; `notes` says what was left out.
+
+    >>> from lidarcore import Scan, open_recording
+    >>> from lidarcore.recordings import RecordingWriter
+    >>> with RecordingWriter("two_scans.mcap") as recording:
+    ...     for stamp in (10.0, 10.1):
+    ...         recording.write(Scan([1.0, 2.0, 3.0], [-0.1, 0.0, 0.1], stamp=stamp))
+    >>> [scan.stamp for scan in open_recording("two_scans.mcap")]
+    [10.0, 10.1]
+
     Raises RecordingError if the path is no readable recording of a known format, and its subclass TopicError
     (with `topics`) if the file holds several lidars and none was chosen, or not the one asked for.
     """
@@ -49,7 +68,7 @@ def open_recording(path: str | os.PathLike[str], topic: str | None = None) -> Re
     if path.is_dir():
         raise RecordingError(f"The directory {path.name} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
     known = ", ".join(format_.name for format_ in FORMATS)
-    raise RecordingError(f"{path.name} is none of the known formats: {known}. It begins with {head[:24]!r}.")
+    raise RecordingError(f"{path.name} is none of the known formats: {known}.")
 
 
 def _head(path: Path) -> bytes:

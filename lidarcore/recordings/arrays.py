@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.files.streams import MEBIBYTE
 from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
-from lidarcore.recordings.streams import allowance
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 NAMES = {
     "ranges": ("ranges",),
@@ -31,6 +31,9 @@ EXPECTED = (
 FARTHEST = 100.0
 """m: a median range beyond this is in another unit."""
 
+SAMPLE = 1 << 20
+"""Ranges that tell the unit of all."""
+
 ONE_TURN = 2 * np.pi + 0.1
 """rad: bearings that span more are in degrees."""
 
@@ -48,10 +51,11 @@ class ArrayRecording(Recording):
         loaded = self._load(lambda name: name.lower() in meaning)
         for name, array in loaded.items():  # that numbers are complex shows only now
             self._check_size(name, array.shape, array.dtype.kind in "fiu")
-        arrays = {meaning[name.lower()]: np.asarray(array, np.float64) for name, array in loaded.items()}
+        arrays: dict[str, NDArray[Any]] = {meaning[name.lower()]: array for name, array in loaded.items()}
         if not {"ranges", "bearings"} <= arrays.keys():
             raise self._error(f"holds {' and '.join(arrays) or 'nothing'} of use: {EXPECTED}.")
         ranges = np.atleast_2d(arrays.pop("ranges"))
+        self._check_beams(ranges.shape[-1])
         self._columns = {name: self._shaped(name, array, *ranges.shape) for name, array in arrays.items()}
         self._columns["ranges"] = ranges
         self._check()
@@ -60,12 +64,16 @@ class ArrayRecording(Recording):
         """Raise RecordingError if an array is not of real numbers, or claims more than the file can hold."""
         if not real:
             raise self._error(f"has a {name} that is not of real numbers: {EXPECTED}.")
-        if 8 * prod(shape) > allowance(self.path):
+        if prod(shape) > self._most_bytes():
             raise self._error(
                 f"has a {name} that claims the shape {shape}, too large for the size of the file."
             )
 
-    def _shaped(self, name: str, array: Array, scans: int, beams: int) -> Array:
+    def _most_bytes(self) -> int:
+        """Bytes that the arrays may take in all: they are in memory as a whole."""
+        return 64 * MEBIBYTE + 2 * self.path.stat().st_size
+
+    def _shaped(self, name: str, array: NDArray[Any], scans: int, beams: int) -> NDArray[Any]:
         """One row for each scan."""
         if name == "stamps" and array.size == scans:
             return array.reshape(scans)
@@ -82,11 +90,11 @@ class ArrayRecording(Recording):
         bearings, ranges = self._columns["bearings"], self._columns["ranges"]
         if not ranges.size:
             raise self._error(f"holds no beam: {EXPECTED}.")
-        if not np.isfinite(bearings).all() or np.ptp(bearings) > ONE_TURN:
-            raise self._error(
-                f"has bearings from {bearings.min():.6g} to {bearings.max():.6g}: expected are radians."
-            )
-        returned = ranges[(ranges > 0) & (ranges < np.inf)]
+        low, high = float(bearings.min()), float(bearings.max())  # either is NaN if any is
+        if not 0 <= high - low <= ONE_TURN:
+            raise self._error(f"has bearings from {low:.6g} to {high:.6g}: expected are radians.")
+        some = ranges[:: max(1, ranges.size // SAMPLE)]
+        returned = some[(some > 0) & (some < np.inf)]
         if len(returned) and np.median(returned) > FARTHEST:
             raise self._error(f"has a median range of {np.median(returned):.6g}: expected are metres.")
         if "stamps" not in self._columns:
@@ -96,4 +104,5 @@ class ArrayRecording(Recording):
     def _scans(self) -> Iterator[Callable[[], Scan]]:
         names = {name: "stamp" if name == "stamps" else name for name in self._columns}
         for index in range(len(self._columns["ranges"])):
-            yield partial(Scan, **{names[name]: column[index] for name, column in self._columns.items()})
+            row = {names[name]: column[index] for name, column in self._columns.items()}
+            yield partial(Scan, **row | {"stamp": float(row["stamp"])})

@@ -10,11 +10,17 @@ from pathlib import Path
 from typing import ClassVar
 
 from lidarcore.errors import LidarError, RecordingError, ScanError, TopicError
-from lidarcore.recordings.streams import MAX_RECORD, MEBIBYTE, available, open_stream
+from lidarcore.files.streams import MEBIBYTE, available, open_stream, whole
 from lidarcore.scan import Array, Scan
 
 NOMINAL_PERIOD = 0.1
 """s between scans where a file does not say: the usual 10 Hz of a small lidar."""
+
+MOST_BEAMS = 1 << 18
+"""Of a scan: ten times those of the densest 2D lidar."""
+
+MOST_NOTES = 100
+"""Kinds of oddities that are counted one by one."""
 
 
 class Recording(ABC):
@@ -24,6 +30,8 @@ class Recording(ABC):
     path            of the file or directory
     topics          the lidars in the file, where the format names them; topic: the one that is read
     T_base_sensor   (3,) x m, y m, yaw rad of the sensor in the robot's base frame; None if the file has none
+    stations        numbers of the scans from which on the sensor stood at another place, as far as the file says so
+                    and the iteration has come; () if it says nothing
 
     Iterating raises RecordingError if the file holds no scan or turns out hostile. What can be saved of a
     damaged or truncated file is yielded, and `notes` say so. Iterate in one place at a time: an iteration
@@ -41,6 +49,7 @@ class Recording(ABC):
         self.topics: tuple[str, ...] = ()
         self.topic: str | None = None
         self.T_base_sensor: Array | None = None
+        self._stations: list[int] = []
         self._remarks: dict[str, None] = {}
         self._counts: Counter[str] = Counter()
         with self._guard():
@@ -60,12 +69,18 @@ class Recording(ABC):
         """Yield what makes each scan: one that turns out damaged is then counted and left out."""
 
     @property
+    def stations(self) -> tuple[int, ...]:
+        """Scans from which on the sensor stood elsewhere."""
+        return tuple(self._stations)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Plain sentences on what was found and handled; the counts in them grow during an iteration."""
         return (*self._remarks, *(f"{count} {what}." for what, count in self._counts.items()))
 
     def __iter__(self) -> Iterator[Scan]:
         self._counts.clear()
+        self._stations.clear()
         empty = True
         with self._guard():
             for make_scan in self._scans():
@@ -100,7 +115,8 @@ class Recording(ABC):
 
     def _count(self, what: str, number: int) -> None:
         if number:
-            self._counts[what] += number
+            is_counted = what in self._counts or len(self._counts) < MOST_NOTES
+            self._counts[what if is_counted else "other oddities"] += number
 
     def _error(self, trouble: str) -> RecordingError:
         """Make an error that also tells what was noted so far."""
@@ -112,10 +128,19 @@ class Recording(ABC):
     def _content(self) -> bytes:
         """Read the whole file, for the formats that cannot be read piece by piece."""
         with self._stream() as stream:
-            content = available(stream, MAX_RECORD)
+            most = whole(self.path)
+            content = available(stream, most, most)
             if stream.read(1):
-                raise self._error(f"is larger than {MAX_RECORD // MEBIBYTE} MiB, too large for {self.name}.")
+                raise self._error(
+                    f"is larger than {most // MEBIBYTE} MiB, too large for {self.name}: give a part of it, "
+                    "or, if it is packed, unpack it."
+                )
         return content
+
+    def _check_beams(self, number: int) -> None:
+        """Raise RecordingError if a scan has more beams than any lidar."""
+        if number > MOST_BEAMS:
+            raise self._error(f"holds a scan of more than {MOST_BEAMS} beams: no 2D lidar sends so many.")
 
     @contextmanager
     def _guard(self) -> Iterator[None]:

@@ -4,13 +4,16 @@ Format: readlog.c and writelog.c of CARMEN's logger.
 """
 
 import re
+from array import array
 
 import numpy as np
 
-from lidarcore.poses import PoseTrack, compose, inverse
-from lidarcore.recordings.laser_log import SICK_RANGE, LaserLog, Reading, numbers
+from lidarcore.geometry import PoseTrack, compose
+from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
+from lidarcore.recordings.laser_survey import SICK_RANGE, Survey
 from lidarcore.scan import Array
 
+_NEW = re.compile(r"(ROBOT|RAW)LASER\d")
 _FRONT, _REAR = ("robot_frontlaser_offset", 0.0), ("robot_rearlaser_offset", np.pi)
 OFFSETS = {"FLASER": _FRONT, "RLASER": _REAR} | {
     f"{kind}LASER{number}": place for kind in ("ROBOT", "RAW") for number, place in ((1, _FRONT), (2, _REAR))
@@ -29,7 +32,7 @@ class CarmenLog(LaserLog):
 
     def _open(self, topic: str | None) -> None:
         self._parameters: dict[str, str] = {}
-        self._wheel_poses: list[Array] = []
+        self._wheel_poses = array("d")
         self._track: PoseTrack | None = None
         super()._open(topic)
 
@@ -37,22 +40,15 @@ class CarmenLog(LaserLog):
         """One laser's readings may be there as RAWLASERn and, with a pose, as ROBOTLASERn."""
         return topics - {topic.replace("ROBOT", "RAW") for topic in topics if topic.startswith("ROBOT")}
 
-    def _survey(self, readings: list[Reading]) -> None:
-        super()._survey(readings)
-        table = np.array(self._wheel_poses).reshape(-1, 4)
-        self._track = PoseTrack(table[:, 0], table[:, 1:])
-        mountings = np.array(
-            [
-                compose(inverse(reading.base_pose), reading.pose)
-                for reading in readings
-                if reading.base_pose is not None and reading.pose is not None
-            ]
-        ).reshape(-1, 3)
-        mountings[:, 2] = np.unwrap(mountings[:, 2])
-        if len(mountings) and np.ptp(mountings, axis=0).max() < 1e-3:
-            self.T_base_sensor = mountings[0].round(6) + 0.0  # no -0
+    def _learn(self, survey: Survey) -> None:
+        super()._learn(survey)
+        table = np.frombuffer(self._wheel_poses).reshape(-1, 4)
+        self._track, self._wheel_poses = PoseTrack(table[:, 0], table[:, 1:]), array("d")
+        mounting = survey.mounting.first
+        if mounting is not None and survey.mounting.is_rigid():
+            self.T_base_sensor = mounting.round(6) + 0.0  # no -0
             return
-        if len(mountings):
+        if mounting is not None:
             self._remark(
                 "One of the two poses in each line was corrected: odometry is the robot's, the second."
             )
@@ -76,11 +72,11 @@ class CarmenLog(LaserLog):
         kind = words[0].decode("ascii", "replace") if words else ""
         if kind in ("FLASER", "RLASER"):
             return _old_laser(kind, words)
-        if kind.startswith(("ROBOTLASER", "RAWLASER")):
+        if _NEW.fullmatch(kind):
             return _new_laser(kind, words)
         if kind == "ODOM" and self._track is None:
-            self._wheel_poses.append(np.array([float(words[7]), *numbers(words[1:], 3)]))
-        elif kind == "PARAM":
+            self._wheel_poses.extend((float(words[7]), *numbers(words[1:], 3)))
+        elif kind == "PARAM" and words[1].decode(errors="replace") in (_FRONT[0], _REAR[0]):
             self._parameters[words[1].decode(errors="replace")] = words[2].decode(errors="replace")
         elif kind == "NEFF":
             self._remark("GMapping wrote the log (NEFF lines): its poses are corrected, not wheel odometry.")

@@ -5,7 +5,8 @@ Format: as gridslamprocessor.cpp of GMapping writes it.
 
 import re
 
-from lidarcore.recordings.laser_log import SICK_RANGE, LaserLog, Reading, numbers
+from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
+from lidarcore.recordings.laser_survey import SICK_RANGE
 
 
 class GmappingStream(LaserLog):

@@ -8,12 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lidarcore.files.streams import lines
 from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
-from lidarcore.recordings.streams import lines
+from lidarcore.recordings.laser_survey import SICK_RANGE, Survey
 from lidarcore.scan import Array, Scan
-
-SICK_RANGE = 80.0
-"""m that a SICK LMS reaches; 81.83 to 81.91 are its error codes."""
 
 SICK_STEPS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
 """Degrees between the beams of a SICK LMS by their number (CARMEN, carmen_laser_guess_angle_increment)."""
@@ -22,7 +20,8 @@ SICK_STEPS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
 class Reading(NamedTuple):
     """One laser line: ranges (N,) m, no return from max_range m on; bearings (N,) rad, None if as of a SICK.
 
-    stamps are candidates in s, best first; pose and base_pose (3,) are of the sensor and of the robot.
+    stamps are candidates in s, best first; pose and base_pose (3,) are of the sensor and of the robot; truth (3,) is
+    T_world_sensor where somebody corrected it.
     """
 
     topic: str
@@ -33,6 +32,7 @@ class Reading(NamedTuple):
     pose: Array | None = None
     base_pose: Array | None = None
     quality: Array | None = None
+    truth: Array | None = None
 
 
 def numbers(words: list[bytes], count: int) -> Array:
@@ -63,25 +63,27 @@ class LaserLog(Recording):
         """Read a line; None if it is not a laser's. Raises ValueError or IndexError if it is damaged."""
 
     def _open(self, topic: str | None) -> None:
-        readings: defaultdict[str, list[Reading]] = defaultdict(list)
+        surveys: defaultdict[str, Survey] = defaultdict(Survey)
         for reading in self._readings():
-            readings[reading.topic].append(reading)
-        if not readings:
+            survey = surveys[reading.topic]
+            survey.add(reading.ranges, reading.stamps, has_bearings=reading.bearings is not None)
+            if reading.pose is not None and reading.base_pose is not None:
+                survey.mounting.add(reading.base_pose, reading.pose)
+        if not surveys:
             raise self._error("holds no readable laser line.")
-        self._choose(self._distinct(set(readings)), topic)
-        self._survey(readings[str(self.topic)])
+        self._choose(self._distinct(set(surveys)), topic)
+        self._learn(surveys[str(self.topic)])
 
     def _distinct(self, topics: set[str]) -> set[str]:
         """Topics without those that repeat another one."""
         return topics
 
-    def _survey(self, readings: list[Reading]) -> None:
+    def _learn(self, survey: Survey) -> None:
         """Learn from all readings of the chosen lidar what a single one does not say."""
-        beams = {len(reading.ranges) for reading in readings if reading.bearings is None}
-        if unknown := beams - SICK_STEPS.keys():
+        if unknown := survey.beams - SICK_STEPS.keys():
             self._remark(f"The log gives no angles: {max(unknown)} beams are taken to span 180 degrees.")
-        self._marker = self._find_marker(np.concatenate([reading.ranges for reading in readings]))
-        self._stamps = self._settle_stamps(np.array([reading.stamps for reading in readings]))
+        self._marker = self._find_marker(survey)
+        self._stamps = self._settle_stamps(survey.stamps())
 
     def _readings(self) -> Iterator[Reading]:
         with self._stream() as stream:
@@ -94,19 +96,17 @@ class LaserLog(Recording):
                     if reading is not None:
                         yield reading
 
-    def _find_marker(self, ranges: Array) -> float:
+    def _find_marker(self, survey: Survey) -> float:
         """Reading in m from which on there was no return.
 
         Some logs hold a clipped value (50.0, 51.15) for it. That is the largest reading, and it occurs more
         often than all others of the last metre together, which true ranges do not.
         """
-        below = ranges[ranges < SICK_RANGE]
-        largest = float(below.max(initial=0))
-        ties, last_metre = int(np.sum(below == largest)), int(np.sum(below > largest - 1))
-        if ties < 10 or 2 * ties <= last_metre:
+        if survey.ties < 10 or 2 * survey.ties <= survey.last_metre():
             return SICK_RANGE
-        self._remark(f"{ties} readings are exactly {largest:.6g} m, the largest: taken to mean no return.")
-        return largest
+        largest = f"exactly {survey.largest:.6g} m, the largest"
+        self._remark(f"{survey.ties} readings are {largest}: taken to mean no return.")
+        return survey.largest
 
     def _settle_stamps(self, candidates: Array) -> Array:
         """Stamps (N,) s: the first column of candidates (N, kinds) that mostly grows, or file order."""
@@ -131,7 +131,8 @@ class LaserLog(Recording):
         self._count("readings at or beyond the largest range taken as missing", int(missing.sum()))
         ranges = np.where(missing, np.nan, reading.ranges)
         bearings = sick_bearings(len(ranges)) if reading.bearings is None else reading.bearings
-        return Scan(ranges, bearings, stamp, reading.quality, odometry=self._odometry(reading, stamp))
+        odometry = self._odometry(reading, stamp)
+        return Scan(ranges, bearings, stamp, reading.quality, odometry=odometry, truth=reading.truth)
 
     def _odometry(self, reading: Reading, stamp: float) -> Array | None:
         """T_odom_sensor (3,) of a reading."""

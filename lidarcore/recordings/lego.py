@@ -4,15 +4,17 @@ Format: lego_robot.py of the course. All may be in one file, or in three: *_scan
 """
 
 import re
+from array import array
 from collections import defaultdict
 from dataclasses import replace
 
 import numpy as np
 
-from lidarcore.poses import PoseTrack, compose
+from lidarcore.files.streams import lines, open_stream
+from lidarcore.geometry import PoseTrack, compose
 from lidarcore.recordings.encoders import dead_reckoning
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
-from lidarcore.recordings.streams import lines, open_stream
+from lidarcore.recordings.laser_survey import Survey
 from lidarcore.scan import Array, Scan
 
 # The scanner has 682 steps and sends lines of 32; the recorder lost the last of each, so that 660 are left. Without
@@ -23,6 +25,7 @@ _AHEAD = 0.030  # m from the robot's centre to the scanner
 _COLUMNS = {b"M": (1, 2, 6), b"P": (1, 2, 3)}  # stamp in ms, then ticks left and right, or x and y in mm
 _NEAREST = 0.02  # m, below which a reading is an error code
 _TICK, _TRACK_WIDTH = 0.349e-3, 0.155  # m, as the robot's maker measured them: the heading drifts with it
+_MOST_ROWS = 1_000_000  # of a kind: a day of them
 _BESIDE = 0.5  # s that a scan may lie before the first or after the last encoder line
 
 
@@ -36,12 +39,12 @@ class LegoLog(LaserLog):
     signature = re.compile(rb"^S \d+ (\d+)( \d+){100}", re.MULTILINE)
 
     def _open(self, topic: str | None) -> None:
-        self._tables: defaultdict[bytes, list[list[float]]] = defaultdict(list)
+        self._tables: defaultdict[bytes, array[float]] = defaultdict(lambda: array("d"))
         self._track: PoseTrack | None = None
         super()._open(topic)
 
-    def _survey(self, readings: list[Reading]) -> None:
-        super()._survey(readings)
+    def _learn(self, survey: Survey) -> None:
+        super()._learn(survey)
         self.T_base_sensor = np.array([_AHEAD, 0.0, 0.0])
         encoders, reference = self._table(b"M", "_motors"), self._table(b"P", "_reference")
         if len(encoders):
@@ -67,7 +70,10 @@ class LegoLog(LaserLog):
         kind = words[0] if words else b""
         if kind in _COLUMNS and self._track is None:
             stamp, *values = (float(words[i]) for i in _COLUMNS[kind])
-            self._tables[kind].append([stamp / 1000, *values])
+            if len(self._tables[kind]) < 3 * _MOST_ROWS:
+                self._tables[kind].extend((stamp / 1000, *values))
+            else:
+                self._count("encoder or reference lines beyond a million left out", 1)
         if kind != b"S":
             return None
         ranges: Array = numbers(words[3:], int(words[2])) / 1000

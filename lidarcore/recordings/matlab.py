@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.recordings.arrays import ArrayRecording
-from lidarcore.recordings.streams import allowance
 
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 """Data types of elements (table 1-1)."""
 
 MATRIX, COMPRESSED = 14, 15
+Buffer = bytes | memoryview
+
 NUMERIC_CLASSES = range(6, 16)
 COMPLEX = 0x800
 BEGINNING = 1 << 12
@@ -45,8 +46,8 @@ class MatlabFile(ArrayRecording):
         if content.startswith(b"MATLAB 7.3"):
             raise self._error("is a MATLAB 7.3 (HDF5) file: save it with `save -v7`.")
         order = "<" if content[126:128] == b"IM" else ">"
-        found = {}
-        for kind, packed in _elements(content[128:], order):
+        found, size = {}, 0
+        for kind, packed in _elements(memoryview(content)[128:], order):
             beginning = (
                 zlib.decompressobj().decompress(packed, BEGINNING)[8:] if kind == COMPRESSED else packed
             )
@@ -55,12 +56,17 @@ class MatlabFile(ArrayRecording):
                 continue
             self._check_size(matrix.name, matrix.shape, matrix.real)
             if kind == COMPRESSED:
-                packed = zlib.decompressobj().decompress(packed, allowance(self.path) + BEGINNING)[8:]
+                unpacked = zlib.decompressobj().decompress(packed, self._most_bytes() + BEGINNING)
+                packed, size = memoryview(unpacked)[8:], size + len(unpacked)
+            if size > self._most_bytes():
+                raise self._error(
+                    "unpacks to arrays too large for its own size: save it with `save -nocompression`."
+                )
             found[matrix.name] = _numbers(packed, order).reshape(matrix.shape, order="F")
         return found
 
 
-def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+def _elements(data: Buffer, order: str) -> Iterator[tuple[int, Buffer]]:
     """Yield type and content of each data element. Raises EOFError if one is cut short."""
     position = 0
     while position + 8 <= len(data):
@@ -76,13 +82,15 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
             position += -position % 8
 
 
-def _describe(matrix: bytes, order: str) -> Matrix:
+def _describe(matrix: Buffer, order: str) -> Matrix:
     (_, flags), (_, shape), (_, name) = islice(_elements(matrix, order), 3)
     (word,) = struct.unpack_from(f"{order}I", flags)
     real = word & 0xFF in NUMERIC_CLASSES and not word & COMPLEX
-    return Matrix(name.decode("ascii", "replace"), tuple(np.frombuffer(shape, f"{order}i4").tolist()), real)
+    return Matrix(
+        bytes(name).decode("ascii", "replace"), tuple(np.frombuffer(shape, f"{order}i4").tolist()), real
+    )
 
 
-def _numbers(matrix: bytes, order: str) -> NDArray[Any]:
+def _numbers(matrix: Buffer, order: str) -> NDArray[Any]:
     kind, real = next(islice(_elements(matrix, order), 3, None))
     return np.frombuffer(real, order + NUMBERS[kind])

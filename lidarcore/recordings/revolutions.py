@@ -4,6 +4,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +14,17 @@ from lidarcore.scan import Array, Scan
 WHOLE = 0.75
 """A first or last revolution that sweeps less than this part of its neighbour was cut by start or stop."""
 
-Revolution = list[tuple[float, ...]]
-"""Samples (angle deg clockwise, distance mm, and quality if there is one)."""
+
+class Revolution(NamedTuple):
+    """Samples (angle deg clockwise, distance mm, and quality if there is one), and the station they are from."""
+
+    samples: list[tuple[float, ...]]
+    station: float = 0.0
+
+
+class _Checked(NamedTuple):
+    samples: Array
+    station: float
 
 
 class RplidarRecording(Recording):
@@ -30,24 +40,29 @@ class RplidarRecording(Recording):
         self._remark(f"There are no stamps: revolutions are taken to be {NOMINAL_PERIOD} s apart.")
 
     def _scans(self) -> Iterator[Callable[[], Scan]]:
+        station = None
         for index, revolution in enumerate(self._whole(map(self._checked, self._revolutions()))):
-            yield partial(_scan, revolution, NOMINAL_PERIOD * index)
+            if revolution.station != station:
+                station = revolution.station
+                self._stations.append(index)
+            yield partial(_scan, revolution.samples, NOMINAL_PERIOD * index)
 
-    def _checked(self, samples: Revolution) -> Array:
+    def _checked(self, revolution: Revolution) -> _Checked:
         """Samples (N, 2 or 3) whose angle is one."""
-        revolution = np.array(samples)
-        sound = (revolution[:, 0] >= 0) & (revolution[:, 0] <= 360)
+        self._check_beams(len(revolution.samples))
+        samples = np.array(revolution.samples)
+        sound = (samples[:, 0] >= 0) & (samples[:, 0] <= 360)
         self._count("samples with an angle outside 0..360 degrees left out", int(np.sum(~sound)))
-        return revolution[sound]
+        return _Checked(samples[sound], revolution.station)
 
-    def _whole(self, revolutions: Iterable[Array]) -> Iterator[Array]:
+    def _whole(self, revolutions: Iterable[_Checked]) -> Iterator[_Checked]:
         """Leave out the first and the last revolution if they are partial."""
         before, current = None, None
         for after in chain(revolutions, [None]):
             if current is not None:
-                neighbours = [sweep(other) for other in (before, after) if other is not None]
+                neighbours = [sweep(other.samples) for other in (before, after) if other is not None]
                 at_end = before is None or after is None
-                if at_end and neighbours and sweep(current) < WHOLE * max(neighbours):
+                if at_end and neighbours and sweep(current.samples) < WHOLE * max(neighbours):
                     self._count("partial revolutions at the start or end left out", 1)
                 else:
                     yield current

@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Iterator
-from itertools import groupby
+from itertools import groupby, islice
 
+from lidarcore.files.streams import lines
+from lidarcore.recordings.base import MOST_BEAMS
 from lidarcore.recordings.revolutions import Revolution, RplidarRecording
-from lidarcore.recordings.streams import lines
 
 FLAGGED = b"newscan,angle,distance"
 STATIONS = b"station,rev,angle_deg,distance_mm"
@@ -20,8 +21,9 @@ class RplidarCsv(RplidarRecording):
     signature = re.compile(rb"\A\s*(%b(,quality)?|%b)\s*\n" % (FLAGGED, STATIONS))
 
     def _revolutions(self) -> Iterator[Revolution]:
-        for _, samples in groupby(self._samples(), key=lambda keyed: keyed[0]):
-            yield [sample for _, sample in samples]
+        for key, samples in groupby(self._samples(), key=lambda keyed: keyed[0]):
+            sweep = [sample for _, sample in islice(samples, MOST_BEAMS + 1)]
+            yield Revolution(sweep, station=key[0] if len(key) > 1 else 0.0)
 
     def _samples(self) -> Iterator[tuple[Values, Values]]:
         """Yield what tells one revolution from the next, and the sample."""

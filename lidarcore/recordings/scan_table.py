@@ -4,11 +4,12 @@ import re
 
 import numpy as np
 
-from lidarcore.recordings.laser_log import SICK_RANGE, LaserLog, Reading, numbers
+from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
+from lidarcore.recordings.laser_survey import SICK_RANGE
 
 
 class ScanTable(LaserLog):
-    """CSV with a header ...,r0,r1,... in m; t, odom_x, odom_y, odom_theta, max_range are used if there."""
+    """CSV with a header ...,r0,r1,... in m; t, max_range, odom_ and corr_ with x, y, theta are used if there."""
 
     name = "CSV table of scans"
     signature = re.compile(rb"\A(\w+,)+r0,r1,[r\d,]+\r?\n")
@@ -25,12 +26,16 @@ class ScanTable(LaserLog):
         values = numbers(cells, len(self._columns))
         named = dict(zip(self._columns, values, strict=True))
         ranges = values[self._columns.index(b"r0") :]
-        pose = np.array([named.get(name, np.nan) for name in (b"odom_x", b"odom_y", b"odom_theta")])
+        odometry, corrected = (
+            np.array([named.get(kind + name, np.nan) for name in (b"_x", b"_y", b"_theta")])
+            for kind in (b"odom", b"corr")
+        )
         return Reading(
             "ranges",
             ranges,
             None,
             float(named.get(b"max_range", SICK_RANGE)),
             (float(named.get(b"t", 0.0)),),
-            pose=pose if np.isfinite(pose).all() else None,
+            pose=odometry if np.isfinite(odometry).all() else None,
+            truth=corrected if np.isfinite(corrected).all() else None,
         )

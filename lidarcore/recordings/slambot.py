@@ -4,12 +4,14 @@ Format: examples/*.log of AerospaceRobotics/RPLidar-SLAMbot, constants from its 
 """
 
 import re
+from array import array
 
 import numpy as np
 
-from lidarcore.poses import PoseTrack, compose
+from lidarcore.geometry import PoseTrack, compose
 from lidarcore.recordings.encoders import dead_reckoning, unwrapped
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
+from lidarcore.recordings.laser_survey import Survey
 from lidarcore.scan import Array
 
 _DEGREES = 360
@@ -28,14 +30,14 @@ class SlambotLog(LaserLog):
     signature = re.compile(rb"\A-?\d+ -?\d+ \d+( \d+){100}")
 
     def _open(self, topic: str | None) -> None:
-        self._counters: list[Array] = []
+        self._counters = array("d")
         self._track: PoseTrack | None = None
         super()._open(topic)
 
-    def _survey(self, readings: list[Reading]) -> None:
-        super()._survey(readings)
+    def _learn(self, survey: Survey) -> None:
+        super()._learn(survey)
         self.T_base_sensor = np.array([_AHEAD, 0.0, 0.0])
-        ticks = np.array(self._counters)[:, :2]
+        ticks = np.frombuffer(self._counters).reshape(-1, 2)
         self._track = PoseTrack(self._stamps, dead_reckoning(self._without_jumps(ticks), _TICK, _TRACK_WIDTH))
 
     def _settle_stamps(self, candidates: Array) -> Array:
@@ -56,7 +58,7 @@ class SlambotLog(LaserLog):
             return None
         left, right, milliseconds, *ranges = numbers(words, 3 + _DEGREES)
         if self._track is None:
-            self._counters.append(np.array([left, right]))
+            self._counters.extend((left, right))
         bearings = -np.deg2rad(np.arange(_DEGREES, dtype=np.float64))
         return Reading("scans", np.array(ranges) / 1000, bearings, np.inf, (milliseconds,))
 

@@ -3,8 +3,9 @@
 import re
 from collections.abc import Iterator
 
+from lidarcore.files.streams import lines
+from lidarcore.recordings.base import MOST_BEAMS
 from lidarcore.recordings.revolutions import Revolution, RplidarRecording
-from lidarcore.recordings.streams import lines
 
 NUMBER = rb"([-+]?\d+(?:\.\d*)?)"
 PRINTED = re.compile(rb"theta: *%b +Dist: *%b +Q: *%b" % (NUMBER, NUMBER, NUMBER))
@@ -27,14 +28,14 @@ class SlamtecDump(RplidarRecording):
     signature = re.compile(rb"\A\s*#RPLIDAR SCAN DATA|%b" % PRINTED.pattern)
 
     def _revolutions(self) -> Iterator[Revolution]:
-        revolution: Revolution = []
+        samples: list[tuple[float, ...]] = []
         for sample in self._samples():
-            if revolution and sample[0] < revolution[-1][0] - STEP_BACK:
-                yield revolution
-                revolution = []
-            revolution.append(sample)
-        if revolution:
-            yield revolution
+            if samples and (sample[0] < samples[-1][0] - STEP_BACK or len(samples) > MOST_BEAMS):
+                yield Revolution(samples)
+                samples = []
+            samples.append(sample)
+        if samples:
+            yield Revolution(samples)
 
     def _samples(self) -> Iterator[tuple[float, ...]]:
         announced = found = 0

@@ -9,10 +9,10 @@ from types import TracebackType
 from typing import Any, Self
 
 from lidarcore.features import Features
+from lidarcore.files.growing_file import GrowingFile
 from lidarcore.recordings.base import NOMINAL_PERIOD
-from lidarcore.recordings.growing_file import GrowingFile
-from lidarcore.recordings.mcap import MAGIC
-from lidarcore.recordings.ros_messages import typestore
+from lidarcore.recordings.ros.mcap import MAGIC
+from lidarcore.recordings.ros.messages import typestore
 from lidarcore.scan import Scan
 
 FLUSH_EVERY = 0.5
@@ -70,7 +70,7 @@ class RecordingWriter:
 
     def write(self, scan: Scan, features: Features | None = None) -> None:
         """Add a scan, and what was found in it. Raises RecordingError, also for a stamp beyond ROS 2."""
-        from lidarcore.recordings.ros_content import contents
+        from lidarcore.recordings.ros.content import contents
 
         self._file.check_open()
         made = contents(scan, features, self._ellipse_scale)

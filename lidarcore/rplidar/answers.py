@@ -134,6 +134,11 @@ class ScanMode:
     max_distance: float
     answer_type: int
 
+    @property
+    def checked(self) -> bool:
+        """Whether packets carry a checksum: without, as in the legacy scan, a wrong distance goes unnoticed."""
+        return self.answer_type != Answer.NODES
+
 
 S1_MODES = (
     ScanMode(0, "Standard", 244.0, 40.0, Answer.NODES),

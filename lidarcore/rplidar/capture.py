@@ -15,8 +15,8 @@ from types import TracebackType
 from typing import IO, Any, Literal, Self
 
 from lidarcore.errors import RecordingError
-from lidarcore.recordings.growing_file import GrowingFile
-from lidarcore.recordings.streams import MAX_LINE, take
+from lidarcore.files.growing_file import GrowingFile
+from lidarcore.files.streams import MAX_LINE, take
 
 Direction = Literal["in", "out"]
 Piece = tuple[Direction, float, bytes]
@@ -75,16 +75,6 @@ class CaptureWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def read_capture(path: str | PathLike[str]) -> Iterator[Piece]:
-    """Yield direction, Unix time (s) and bytes of each record; one that is cut short at the end is left out.
-
-    Raises RecordingError if the file is no capture.
-    """
-    with Path(path).open("rb") as file:
-        read_stream(file)
-        yield from read_pieces(file)
 
 
 def read_stream(file: IO[bytes]) -> Stream:

@@ -14,11 +14,11 @@ from serial.tools.list_ports import comports
 
 from lidarcore.errors import DeviceError, NoAnswerError
 from lidarcore.rplidar.connection.devices import find_other_baud, only_device
+from lidarcore.rplidar.connection.exit_handlers import close_at_exit, forget_at_exit
 from lidarcore.rplidar.connection.handshake import choose_mode
 from lidarcore.rplidar.connection.latest import Latest
-from lidarcore.rplidar.connection.leaving import close_on_leaving, leave_alone
 from lidarcore.rplidar.connection.port import Cancelled, ListPorts, Tap
-from lidarcore.rplidar.connection.returning import find_again
+from lidarcore.rplidar.connection.reconnection import find_again
 from lidarcore.rplidar.connection.session import Session, Wishes
 from lidarcore.rplidar.connection.statistics import Statistics, Tally
 from lidarcore.rplidar.protocol import S1_MODES, DeviceInfo, Health, Revolution, ScanMode
@@ -87,11 +87,11 @@ class Driver:
 
     def __enter__(self) -> Self:
         self._become("connecting")
-        close_on_leaving(self.close)
+        close_at_exit(self.close)
         try:
             self._session = self._connect_first(self._port or only_device(self._list_ports))
         except BaseException as error:
-            leave_alone(self.close)
+            forget_at_exit(self.close)
             self._become("closed", str(error))
             raise
         self._thread.start()
@@ -105,7 +105,7 @@ class Driver:
 
         Entering that is still under way in another thread raises DeviceError soon.
         """
-        leave_alone(self.close)
+        forget_at_exit(self.close)
         self._closing.set()
         self._revolutions.close()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
@@ -117,7 +117,7 @@ class Driver:
             yield revolution.scan(time.time() - time.monotonic())
 
     def revolutions(self) -> Iterator[Revolution]:
-        """The same before they are turned into scans, with times of time.monotonic(), in s."""
+        """Revolutions as they were decoded, before they become scans; times are of time.monotonic(), in s."""
         while (revolution := self._revolutions.get()) is not None:
             yield revolution
         if self._failure:

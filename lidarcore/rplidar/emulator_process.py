@@ -21,6 +21,7 @@ _QUIT_TIME = 5.0  # s
 class EmulatorProcess:
     """An emulated S1 at `port`, with the options of EmulatorOptions; a context manager.
 
+    noise   what its measurements err by
     on_end  called, from a thread of its own, when the process ends without `close`; its port is gone by then
 
     Raises DeviceError if it does not come up, and pydantic's ValidationError for options that cannot be.
@@ -28,6 +29,7 @@ class EmulatorProcess:
 
     def __init__(self, *, on_end: Callable[[], None] | None = None, **options: Any) -> None:
         chosen = EmulatorOptions(**options)
+        self.noise = chosen.noise
         self._owns_folder = chosen.link is None
         self._on_end = on_end
         self._closing = threading.Event()

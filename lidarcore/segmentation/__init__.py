@@ -6,15 +6,29 @@ Pieces are inclusive ranges [first, last] of points.
 
 import numpy as np
 
-from lidarcore.compiled import kernel
+from lidarcore.compiled import inlined, kernel
+from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
 from lidarcore.segmentation.ends import place_ends
 from lidarcore.segmentation.merge import merge, surest_corner
 from lidarcore.segmentation.ring import compact, find_breaks, mean_increment, noise_seen, unroll
 from lidarcore.segmentation.split import split_runs
-from lidarcore.segmentation.sums import SUMS, residuals, sums
+from lidarcore.segmentation.sums import SUMS, judge, sums_of
 
-__all__ = ["compact", "find_pieces", "mean_increment", "noise_seen"]
+__all__ = ["compact", "find_pieces", "for_pieces", "mean_increment", "noise_seen"]
+
+
+@inlined
+def for_pieces(noise: NoiseModel, seen: float) -> NoiseModel:
+    """The noise that pieces are made for: the noise seen (m), if that is larger.
+
+    Told too little noise, walls would fall apart. Who gives the unevenness of walls has measured both.
+    """
+    v_rho = noise.v_rho if noise.v_wall > 0 else max(noise.v_rho, seen * seen)
+    return NoiseModel(
+        v_rho, noise.v_theta, noise.growth, noise.v_wall, noise.length, noise.renewal,
+        noise.resampling, noise.v_systematic, noise.tails, noise.widened, noise.latent,
+    )  # fmt: skip
 
 
 @kernel
@@ -22,8 +36,7 @@ def find_pieces(
     points: Array,
     beams: Ints,
     n: int,
-    v_rho: float,
-    v_theta: float,
+    noise: NoiseModel,
     threshold: float,
     gap: float,
     increment: float,
@@ -39,25 +52,24 @@ def find_pieces(
     starts, first, last, run, stack = indices[0], indices[1], indices[2], indices[3], indices[4]
     if n == 0:
         return first[:0], last[:0]
-    n_runs = find_breaks(points, n, gap, increment, v_rho, scratch, starts)
+    n_runs = find_breaks(points, n, gap, increment, noise.v_rho + noise.v_wall, scratch, starts)
     closed = n_runs == 0
     if closed:  # start where the ring surely bends
         starts[0], n_runs = np.argmax(points[0, :n]), 1
     while True:
         starts[n_runs] = starts[0] + n
         unroll(points, beams, n, starts[0])
-        count = split_runs(
-            points, starts[: n_runs + 1], threshold, v_rho, v_theta, scratch, stack, first, last, run
-        )
+        count = split_runs(points, starts[: n_runs + 1], threshold, noise, scratch, stack, first, last, run)
         m = np.empty((count + 1, SUMS))
+        sums_of(points, first, last, m, count, trimmed=False)
         for p in range(count):
-            inside = slice(first[p], last[p] + 1)
-            sums(points[0, inside], points[1, inside], points[2, inside], m[p])
-            m[p, 9], variance = residuals(m[p], v_rho, v_theta)
-            m[p, 8] = m[p, 9] / variance
-        count = merge(first, last, run, m, count, v_rho, v_theta, scratch, indices[4:])
-        place_ends(points, first, last, run, m, count, increment, v_rho, v_theta)
+            judge(m[p], noise)
+        count = merge(first, last, run, m, count, noise, scratch, indices[4:])
+        place_ends(points, first, last, run, m, count, increment, noise)
         if not closed or count < 2:
             return first[:count], last[:count]
+        sums_of(points, first, last, m, count, trimmed=False)
+        for p in range(count):
+            judge(m[p], noise)
         # Noise moves the farthest point along its wall: once more from where two walls surely meet.
-        starts[0], closed = first[surest_corner(m, count, v_rho, v_theta)] % n, False
+        starts[0], closed = first[surest_corner(m, count, noise)] % n, False

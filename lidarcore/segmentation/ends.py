@@ -5,7 +5,9 @@ and beams of the neighbour bend the line; the bearing at which the lines meet do
 """
 
 from lidarcore.compiled import inlined
+from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
+from lidarcore.segmentation.split import variance
 from lidarcore.segmentation.sums import line_of, sums_of
 
 _PASSES = 2  # the lines follow their ends: the first pass takes out most of what is the neighbour's
@@ -18,7 +20,7 @@ _STEP_CHI2 = (
 @inlined
 def place_ends(
     points: Array, first: Ints, last: Ints, run: Ints, m: Array, count: int,
-    increment: float, v_rho: float, v_theta: float,
+    increment: float, noise: NoiseModel,
 ) -> None:  # fmt: skip
     """Move each common end of two neighbours in one run to where their lines meet, or to the likeliest step.
 
@@ -30,16 +32,14 @@ def place_ends(
         sums_of(points, first, last, m, count, trimmed=again == 0)
         for i in range(count - 1):
             if run[i] == run[i + 1]:
-                last[i] = _common_end(
-                    points, first[i], last[i], last[i + 1], m[i], m[i + 1], reach, v_rho, v_theta
-                )
+                last[i] = _common_end(points, first[i], last[i], last[i + 1], m[i], m[i + 1], reach, noise)
                 first[i + 1] = last[i] + 1
 
 
 @inlined
 def _common_end(
     points: Array, first: int, end: int, last: int, a: Array, b: Array,
-    reach: int, v_rho: float, v_theta: float,
+    reach: int, noise: NoiseModel,
 ) -> int:  # fmt: skip
     """The last point of the first of two pieces (first ... end, end + 1 ... last) with sums a and b.
 
@@ -52,8 +52,8 @@ def _common_end(
     turn = ax * by - ay * bx
     x, y = (ar * by - br * ay) / turn, (br * ax - ar * bx) / turn
     # The noise is of the ranges: a wall seen at a grazing angle is near every point.
-    w_a = _weight(rho[end], c[end], s[end], ax, ay, v_rho, v_theta)
-    w_b = _weight(rho[end], c[end], s[end], bx, by, v_rho, v_theta)
+    w_a = _weight(rho[end], c[end], s[end], ax, ay, noise)
+    w_b = _weight(rho[end], c[end], s[end], bx, by, noise)
     low, high = max(first + 1, end - reach), min(last - 1, end + reach)
     likeliest = meeting = low - 1
     cost = least = cost_meeting = 0.0
@@ -69,7 +69,7 @@ def _common_end(
 
 
 @inlined
-def _weight(rho: float, c: float, s: float, nx: float, ny: float, v_rho: float, v_theta: float) -> float:
+def _weight(rho: float, c: float, s: float, nx: float, ny: float, noise: NoiseModel) -> float:
     """Inverse variance of a point's distance from a line with this normal."""
     across, along = nx * c + ny * s, rho * (nx * s - ny * c)
-    return 1 / (v_rho * across * across + v_theta * along * along)
+    return 1 / variance(rho, across, along, noise)

@@ -3,8 +3,9 @@
 import numpy as np
 
 from lidarcore.compiled import inlined, kernel
+from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.sums import join, residuals
+from lidarcore.segmentation.sums import CHI2, SQUARES, copy, join, residuals
 
 _MERGE_CHI2 = (
     25.0  # far out for the two or three parameters saved: splits are chosen at extremes, not at random
@@ -18,8 +19,7 @@ def merge(
     run: Ints,
     m: Array,
     count: int,
-    v_rho: float,
-    v_theta: float,
+    noise: NoiseModel,
     cost: Array,
     chain: Ints,
 ) -> int:
@@ -31,43 +31,44 @@ def merge(
     joined, before, after = m[count], chain[0], chain[1]
     for i in range(count):
         before[i], after[i] = i - 1, i + 1
-        cost[i] = _cost_after(i, after, run, m, count, v_rho, v_theta, joined)
+        cost[i] = _cost_after(i, after, run, m, count, noise, joined)
     while True:
         i = _cheapest(cost, count)
         if not cost[i] < _MERGE_CHI2:
             break
         gone = after[i]
-        cost_of_joining(m[i], m[gone], v_rho, v_theta, joined)
-        m[i] = joined
+        cost_of_joining(m[i], m[gone], noise, joined)
+        copy(joined, m[i])
         last[i], after[i], cost[gone] = last[gone], after[gone], np.inf
         run[gone] = -1
         if after[i] < count:
             before[after[i]] = i
-        cost[i] = _cost_after(i, after, run, m, count, v_rho, v_theta, joined)
+        cost[i] = _cost_after(i, after, run, m, count, noise, joined)
         k = before[i]
         if k >= 0:
-            cost[k] = _cost_after(k, after, run, m, count, v_rho, v_theta, joined)
+            cost[k] = _cost_after(k, after, run, m, count, noise, joined)
     kept = 0
     for i in range(count):
         if run[i] >= 0:
-            first[kept], last[kept], run[kept], m[kept] = first[i], last[i], run[i], m[i]
+            first[kept], last[kept], run[kept] = first[i], last[i], run[i]
+            copy(m[i], m[kept])
             kept += 1
     return kept
 
 
 @inlined
 def _cost_after(
-    i: int, after: Ints, run: Ints, m: Array, count: int, v_rho: float, v_theta: float, joined: Array
+    i: int, after: Ints, run: Ints, m: Array, count: int, noise: NoiseModel, joined: Array
 ) -> float:
     """Cost of joining a piece with the one after it; infinite at the end of a run."""
     k = after[i]
     if k == count or run[k] != run[i]:
         return np.inf
-    return cost_of_joining(m[i], m[k], v_rho, v_theta, joined)
+    return cost_of_joining(m[i], m[k], noise, joined)
 
 
 @inlined
-def cost_of_joining(a: Array, b: Array, v_rho: float, v_theta: float, joined: Array) -> float:
+def cost_of_joining(a: Array, b: Array, noise: NoiseModel, joined: Array) -> float:
     """By how much the chi-square of the residuals grows if one line serves both pieces.
 
     Taken with each piece's own variance, or all with the variance of the joined one, whichever is less: the first
@@ -75,9 +76,9 @@ def cost_of_joining(a: Array, b: Array, v_rho: float, v_theta: float, joined: Ar
     follow the beams.
     """
     join(a, b, joined)
-    together, variance = residuals(joined, v_rho, v_theta)
-    joined[8], joined[9] = together / variance, together
-    return min(joined[8] - a[8] - b[8], (together - a[9] - b[9]) / variance)
+    together, variance = residuals(joined, noise)
+    joined[SQUARES], joined[CHI2] = together, together / variance
+    return min(joined[CHI2] - a[CHI2] - b[CHI2], (joined[SQUARES] - a[SQUARES] - b[SQUARES]) / variance)
 
 
 @inlined
@@ -90,11 +91,11 @@ def _cheapest(cost: Array, count: int) -> int:
 
 
 @inlined
-def surest_corner(m: Array, count: int, v_rho: float, v_theta: float) -> int:
+def surest_corner(m: Array, count: int, noise: NoiseModel) -> int:
     """The piece that is the most expensive to join with the one before it; m[count] is scratch."""
     surest, most = 1, -np.inf
     for i in range(1, count):
-        cost = cost_of_joining(m[i - 1], m[i], v_rho, v_theta, m[count])
+        cost = cost_of_joining(m[i - 1], m[i], noise, m[count])
         if cost > most:
             surest, most = i, cost
     return surest

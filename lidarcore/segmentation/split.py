@@ -3,6 +3,7 @@
 import numpy as np
 
 from lidarcore.compiled import finite_kernel, inlined, kernel
+from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
 
 _SIGMAS = 3.0  # a point may be this far from the chord by noise
@@ -14,8 +15,7 @@ def split_runs(
     points: Array,
     starts: Ints,
     threshold: float,
-    v_rho: float,
-    v_theta: float,
+    noise: NoiseModel,
     distance: Array,
     stack: Ints,
     first: Ints,
@@ -27,7 +27,7 @@ def split_runs(
     for k in range(len(starts) - 1):
         a = starts[k]
         ends = last[count:]
-        n_ends = split(points, a, starts[k + 1] - 1, threshold, v_rho, v_theta, distance, stack, ends)
+        n_ends = split(points, a, starts[k + 1] - 1, threshold, noise, distance, stack, ends)
         for e in range(n_ends):
             first[count + e], run[count + e] = a, k
             a = ends[e] + 1
@@ -41,16 +41,18 @@ def split(
     first: int,
     last: int,
     threshold: float,
-    v_rho: float,
-    v_theta: float,
+    noise: NoiseModel,
     distance: Array,
     stack: Ints,
     ends: Ints,
 ) -> int:
     """Iterative end point fit of one run: the last point of each piece into ends, in order; their number.
 
-    A piece is split where a point is farther from its chord than the threshold and than the noise explains.
+    A piece is split where a point is farther from its chord than the threshold and than the noise explains. Where the
+    unevenness of walls is known, that decides alone: what it does not explain is not one wall.
     """
+    if noise.v_wall > 0:
+        threshold = 0.0
     rho, c, s = points[0], points[1], points[2]
     stack[0] = last
     depth, n_ends = 1, 0
@@ -62,8 +64,8 @@ def split(
             k, largest = farthest_from_chord(rho[inner], c[inner], s[inner], distance[inner], nx, ny, r)
             k += first + 1
             across, along = nx * c[k] + ny * s[k], rho[k] * (nx * s[k] - ny * c[k])
-            v = v_rho * across * across + v_theta * along * along
-            if largest > threshold and largest * largest > _SIGMAS * _SIGMAS * _CHORD_SHARE * v:
+            limit = _SIGMAS * _SIGMAS * _CHORD_SHARE * variance(rho[k], across, along, noise)
+            if largest > threshold and largest * largest > limit:
                 stack[depth] = k
                 depth += 1
                 continue
@@ -72,6 +74,14 @@ def split(
         first = last
         depth -= 1
     return n_ends
+
+
+@inlined
+def variance(rho: float, across: float, along: float, noise: NoiseModel) -> float:
+    """Of a point's distance from a line: its coordinate `along` it, its beam at cos(incidence) `across`."""
+    square = rho * rho
+    v_rho = noise.v_rho + noise.growth * square * square
+    return v_rho * across * across + noise.v_theta * along * along + noise.v_wall
 
 
 @inlined

@@ -8,4 +8,12 @@ from lidarcore.simulation.rooms import furnished_room, random_pose
 from lidarcore.simulation.sensor import SimulatedSensor
 from lidarcore.simulation.world import World
 
-__all__ = ["SimulatedSensor", "World", "furnished_room", "random_pose"]
+__all__ = [
+    "SimulatedSensor",
+    "World",
+    "furnished_room",
+    "random_pose",
+    "robot",
+    "settings",
+    "worlds",
+]

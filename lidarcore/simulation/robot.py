@@ -5,7 +5,7 @@ from itertools import count
 
 import numpy as np
 
-from lidarcore.poses import compose, inverse, wrap
+from lidarcore.geometry import compose, relative, wrap
 from lidarcore.scan import Array, Scan
 from lidarcore.simulation.people import Person
 from lidarcore.simulation.scene import Optics, Scene
@@ -43,7 +43,8 @@ class SimulatedRobot:
         of_sensor, of_odometry, of_people = (
             np.random.default_rng(seed) for seed in np.random.SeedSequence(settings.seed).spawn(3)
         )
-        scene = Scene(self.place.world, self.path, self._people(of_people), self.place.posts)
+        world = self.place.world.uneven(settings.noise, settings.seed)
+        scene = Scene(world, self.path, self._people(of_people), self.place.posts)
         optics = Optics(
             settings.noise, settings.mixed, settings.dropouts, limits=(_NEAREST, settings.max_range)
         )
@@ -87,7 +88,7 @@ class _Wheels:
         if self._before is None:
             self._odometry = truth
         else:
-            moved = compose(inverse(self._before), truth)
+            moved = relative(self._before, truth)
             self._odometry = compose(self._odometry, self._error.measured(moved, self._rng))
         self._before = truth
         return self._odometry

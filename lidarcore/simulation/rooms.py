@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.geometry import act
 from lidarcore.scan import Array
 from lidarcore.simulation.world import World
 
@@ -52,6 +53,5 @@ def polygon(vertices: ArrayLike) -> Array:
 
 def box(x: float, y: float, length: float, width: float, turn: float) -> Array:
     """Walls (4, 2, 2) m of a box around (x, y), turned by `turn` rad."""
-    c, s = np.cos(turn), np.sin(turn)
     half = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [length / 2, width / 2]
-    return polygon(half @ np.array([[c, s], [-s, c]]) + [x, y])
+    return polygon(act(np.array([x, y, turn]), half))

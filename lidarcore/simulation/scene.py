@@ -66,7 +66,8 @@ class Optics:
 
     def observe(self, ranges: Array, sines: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Reported ranges (N,) m, NaN for no return, and quality (N,), 0 to 63, of neighbouring beams."""
-        seen = self._mix(ranges, rng) + rng.normal(0, self.noise.sigma_range, len(ranges))
+        sigmas = np.sqrt(self.noise.range_variances(ranges))
+        seen = self._mix(ranges, rng) + sigmas * rng.normal(size=len(ranges))
         low, high = self.limits
         lost = (rng.random(len(ranges)) < self.dropouts) | (sines < self.grazing)
         seen = np.where(lost | ~((seen >= low) & (seen <= high)), np.nan, seen)

@@ -13,7 +13,7 @@ RATE = 10.0  # revolutions per second, as an RPLIDAR S1 turns
 
 @dataclass(slots=True)
 class SimulatedSensor:
-    """A 360 degree sensor of `beams` beams per revolution in a world."""
+    """A 360 degree sensor of `beams` beams per revolution in a world, whose walls are as even as the world says."""
 
     world: World
     noise: SensorNoise = field(default_factory=lambda: SensorNoise(0.01, 0.001))
@@ -28,7 +28,7 @@ class SimulatedSensor:
         turns = (np.arange(self.beams, dtype=np.float64) + rng.uniform()) / self.beams
         true_bearings: Array = 2 * np.pi * turns - np.pi
         ranges, hit = self.world.cast(pose, true_bearings)
-        ranges = ranges + rng.normal(0, self.noise.sigma_range, self.beams)
+        ranges = ranges + np.sqrt(self.noise.range_variances(ranges)) * rng.normal(size=self.beams)
         bearings = true_bearings + rng.normal(0, self.noise.sigma_bearing, self.beams)
         bearings = (bearings + np.pi) % (2 * np.pi) - np.pi
         ranges[ranges > self.max_range] = np.nan

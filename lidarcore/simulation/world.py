@@ -1,18 +1,28 @@
-"""A flat world of straight walls, and where beams meet them."""
+"""A flat world of walls, and where beams meet them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lidarcore.compiled import kernel
+from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Ints
+from lidarcore.simulation.surface import Surface
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class World:
-    """Walls (W, 2, 2): start and end points, m, world frame."""
+    """Walls (W, 2, 2): start and end points, m, world frame; straight ones without a surface."""
 
     walls: Array
+    surface: Surface | None = None
+
+    def uneven(self, noise: SensorNoise, seed: int) -> "World":
+        """The same with walls as uneven as the noise says; as they are if it says nothing of that."""
+        if not noise.unevenness:
+            return self
+        surface = Surface.of(self.walls, noise.unevenness, noise.unevenness_length, seed)
+        return replace(self, surface=surface)
 
     def cast(self, pose: Array, bearings: Array) -> tuple[Array, Ints]:
         """True ranges (N,) m, NaN where no wall is met, and the wall each beam meets (N,), -1 for none.
@@ -22,8 +32,26 @@ class World:
         """
         ranges, hit = np.empty(len(bearings)), np.empty(len(bearings), np.int64)
         x, y, heading = np.broadcast_to(pose, (len(bearings), 3)).T.copy()
-        _cast(self.walls, x, y, bearings + heading, ranges, hit)
+        directions = bearings + heading
+        _cast(self.walls, x, y, directions, ranges, hit)
+        if self.surface is not None:
+            seen = hit >= 0
+            ranges[seen] += self._farther(
+                self.surface, hit[seen], x[seen], y[seen], directions[seen], ranges[seen]
+            )
         return ranges, hit
+
+    def _farther(
+        self, surface: Surface, hit: Ints, x: Array, y: Array, directions: Array, ranges: Array
+    ) -> Array:
+        """By how much (N,) m beams go on, where they meet the surface instead of the line; to first order."""
+        start, along = self.walls[hit, 0], self.walls[hit, 1] - self.walls[hit, 0]
+        along = along / np.hypot(along[:, 0], along[:, 1])[:, None]
+        ux, uy = np.cos(directions), np.sin(directions)
+        share = (x + ranges * ux - start[:, 0]) * along[:, 0] + (y + ranges * uy - start[:, 1]) * along[:, 1]
+        outwards = along[:, 0] * uy - along[:, 1] * ux  # cosine of the angle to the normal on the left
+        farther: Array = surface.at(hit, np.maximum(share, 0.0)) / outwards
+        return farther
 
     def clearance(self, x: float, y: float) -> float:
         """Distance (m) from a point to the nearest wall."""

@@ -2,7 +2,7 @@
 // a model {key, value(path), change(path, value)}: the server's settings, or a draft that is sent as a whole.
 
 import { el } from "./dom.js";
-import { changeSetting, setting } from "./session.js";
+import { changeSetting, setting } from "./actions.js";
 import { on } from "./store.js";
 
 const same = (value) => value;
@@ -47,10 +47,16 @@ export function selectRow(label, path, options, model) {
 
 /** One of a few, side by side: `choices` are [value, text] pairs; further attributes go to the group. */
 export function segmentedRow(label, path, choices, attributes = {}) {
+  const settled = { value: () => setting(path), change: (value) => changeSetting(path, value) };
+  return choiceRow(label, idOf(path), choices, settled, attributes);
+}
+
+/** The same of what several settings say together: `value()` tells it, `change(value)` sets it. */
+export function choiceRow(label, name, choices, { value: chosen, change }, attributes = {}) {
   const radios = choices.map(([value, text]) => {
-    const radio = el("input", { type: "radio", name: idOf(path), value, class: "visually-hidden" });
-    radio.addEventListener("change", () => changeSetting(path, value));
-    on(["settings"], () => (radio.checked = setting(path) === value));
+    const radio = el("input", { type: "radio", name, value, class: "visually-hidden" });
+    radio.addEventListener("change", () => change(value));
+    on(["settings"], () => (radio.checked = chosen() === value));
     return el("label", {}, radio, el("span", {}, text));
   });
   const group = el("fieldset", { class: "row segmented", ...attributes });

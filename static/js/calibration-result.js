@@ -37,14 +37,14 @@ function figures(result, from) {
   return el("dl", { class: "facts", "aria-label": "Result, with 95 % confidence intervals" }, ...pairs);
 }
 
-/** A noise whose interval begins at 0 cannot be told from none. */
+/** A noise whose interval begins at 0 cannot be distinguished from none. */
 const sigma = (figure, factor, digits, unit) =>
   figure.low > 0
     ? spread(figure, factor, digits, unit)
-    : `cannot be told, at most ${fixed(factor * figure.high, digits)}\u2009${unit}`;
+    : `unknown, at most ${fixed(factor * figure.high, digits)}\u2009${unit}`;
 
 function spread(figure, factor, digits, unit) {
-  if (!figure) return "cannot be told";
+  if (!figure) return "unknown";
   const shown = (x) => fixed(Number((factor * x).toFixed(digits)) || 0, digits); // no minus before 0
   const [value, low, high] = [figure.value, figure.low, figure.high].map(shown);
   return `${value}\u2009${unit} (${low} to ${high})`;
@@ -94,7 +94,7 @@ const between = (edges, at, factor, digits, unit) =>
   `${fixed(factor * edges[at], digits)} to ${fixed(factor * edges[at + 1], digits)}\u2009${unit}`;
 
 const title = ({ name, found }) =>
-  `Range noise by ${name}: ${found.differs ? "it differs" : "no difference is seen"}`;
+  `Range noise by ${name}: ${found.differs ? "it differs" : "no difference is detected"}`;
 
 const describe = (band) => {
   const { found, factor, digits, unit } = band;
@@ -104,13 +104,10 @@ const describe = (band) => {
   return `${title(band)}. ${told.join(", ")}.`;
 };
 
-/** What to do with the noise that could be told, beside what is set where it could not. */
+/** What to do with the noise that could be told, beside what is set where it could not: the systematic part never is. */
 function actions(told, set) {
   if (told.sigma_range === null && told.sigma_bearing === null) return [];
-  const found = {
-    sigma_range: told.sigma_range ?? set.sigma_range,
-    sigma_bearing: told.sigma_bearing ?? set.sigma_bearing,
-  };
+  const found = { ...set, ...Object.fromEntries(Object.entries(told).filter(([, value]) => value !== null)) };
   const inUse = sameNoise(found, set);
   const use = el(
     "button",

@@ -4,14 +4,14 @@ import { request } from "./api.js";
 import { calibrationResult } from "./calibration-result.js";
 import { $, el, remake, setText } from "./dom.js";
 import { listProfiles, mountProfiles } from "./profiles.js";
-import { attempt } from "./session.js";
+import { attempt } from "./actions.js";
 import { get, on, set } from "./store.js";
 
 const ASK_MS = 400;
 const [LEAST, PRESET, MOST] = ["10", "100", "300"];
 
 const ABOUT =
-  "Let the sensor stand still in a room with straight walls. How ranges scatter from scan to scan tells its noise.";
+  "Let the sensor stand still in a room with straight walls. The scatter of the ranges from scan to scan gives its noise.";
 
 const scans = el("input", {
   type: "number",
@@ -59,15 +59,20 @@ export function mountCalibration() {
 
 const isRunning = ({ state }) => state === "collecting" || state === "calculating";
 
-async function start(event) {
+function start(event) {
   event.preventDefault();
+  return startCalibration();
+}
+
+/** Measures the noise of what plays from the scans that come. */
+export async function startCalibration() {
   const wanted = { scans: Number(scans.value) };
-  await attempt(() => request("POST", "calibration", wanted), "The calibration did not begin");
+  await attempt(() => request("POST", "calibration", wanted), "The calibration could not be started");
   await ask(); // another browser may have begun one
 }
 
 async function cancel() {
-  await attempt(() => request("DELETE", "calibration"), "The calibration goes on");
+  await attempt(() => request("DELETE", "calibration"), "The calibration could not be cancelled");
   await ask();
 }
 

@@ -1,6 +1,7 @@
 // What each method claims against what is so: a table with a plain verdict, and the verdict on the method in use.
 
 import { KINDS } from "./boxes.js";
+import { startCalibration } from "./calibration.js";
 import { $, el, setText, swatch } from "./dom.js";
 import { showPanel } from "./tabs.js";
 import { fixed, UNKNOWN } from "./units.js";
@@ -13,16 +14,18 @@ const FIGURES = [
 ];
 
 const MEANING = {
-  "too small": "they are too small, and claim to know more than they do",
-  true: "that is true, they can be believed",
-  "too large": "they are too large, and claim to know less than they do",
-  open: "too few sightings to tell whether that is true",
+  "too small": "they are too small and claim too much certainty",
+  true: "they match the scatter and can be trusted",
+  "too large": "they are too large and claim too little certainty",
+  open: "too few observations yet to judge them",
 };
 
 const NOISE = { "too small": "more", "too large": "less" };
 
-/** The table, with its head. */
-export function claimTable() {
+const CORNERS = "repeatability-table";
+
+/** A table of claims with its head; of the corners, if no other id is given. */
+export function claimTable(id = CORNERS) {
   const heads = FIGURES.map(({ label }) => el("th", { scope: "col" }, label));
   const head = el(
     "tr",
@@ -37,18 +40,23 @@ export function claimTable() {
     "For each method and covariance: area of the claimed ellipses over that of the scatter, share of the scatter that " +
       "the ellipses of 50, 95 and 99 percent hold, each with its 95 percent confidence interval, and what that means.",
   );
-  return el("table", { class: "listing", id: "repeatability-table" }, caption, el("thead", {}, head));
+  return el("table", { class: "listing", id }, caption, el("thead", {}, head));
 }
 
 /** Writes the figures of a summary's methods, and the verdict on the one in use. */
-export function drawClaims(methods, { fitter, covariance }) {
-  const table = $("repeatability-table");
+export function drawClaims(methods, extraction) {
+  drawTable(methods, extraction, CORNERS, "repeatability-verdict");
+  drawHint(wrongForAll(methods));
+}
+
+/** Writes a table and the verdict on the method in use. */
+export function drawTable(methods, { fitter, covariance }, id, verdict) {
+  const table = $(id);
   for (const body of [...table.tBodies]) body.remove();
   table.append(...methods.map(bodyOf));
   const used = methods.find(({ name }) => name === fitter)?.claims[covariance];
-  setText($("repeatability-verdict"), used ? sentence(fitter, covariance, used) : "");
-  $("repeatability-verdict").dataset.verdict = used?.verdict ?? "";
-  drawHint(wrongForAll(methods));
+  setText($(verdict), used ? sentence(fitter, covariance, used) : "");
+  $(verdict).dataset.verdict = used?.verdict ?? "";
 }
 
 /** What to do if all are wrong: it stands above the table, whose words then say little. */
@@ -56,6 +64,7 @@ export function calibrateHint() {
   const onclick = () => {
     showPanel("setup", { focus: true });
     $("calibration").scrollIntoView({ block: "start" });
+    startCalibration();
   };
   return el(
     "div",
@@ -111,6 +120,6 @@ function drawHint(verdict) {
   setText(
     hint.firstElementChild,
     `The consistent ellipses of all methods are ${verdict}: the sensor has ${NOISE[verdict]} noise than Setup says. ` +
-      "Calibrate first (in Setup); until then the words below say little.",
+      "Calibrate first; until then the verdicts below mean little.",
   );
 }

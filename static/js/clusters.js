@@ -25,7 +25,7 @@ export function mountClusters() {
       $("cluster-cost"),
       clusters
         ? `${clusters.length} in this scan, found in ${microseconds(timings.cluster_us)}.`
-        : "Looked for when they are shown, or are the landmarks of the map.",
+        : "Computed only while they are shown or used as landmarks.",
     ),
   );
 }

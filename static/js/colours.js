@@ -1,8 +1,6 @@
-// The colours of the methods as the server declares them; darker on a light ground, exactly as in the scene.
+// The colours and dashes of the methods as the server declares them.
 
 import { get, on } from "./store.js";
-
-const LIGHT_GROUND = 0.7; // the factor of app/colours.py
 
 export function mountColours() {
   on(["methods", "settings"], (methods) => {
@@ -13,11 +11,6 @@ export function mountColours() {
 
 /** The colour of a method as #rrggbb, readable in the current theme. */
 export function methodColour(name) {
-  const declared = get("methods").find((method) => method.name === name).colour;
-  return document.documentElement.dataset.theme === "light" ? darker(declared) : declared;
-}
-
-function darker(colour) {
-  const channels = [1, 3, 5].map((at) => Math.floor(parseInt(colour.slice(at, at + 2), 16) * LIGHT_GROUND));
-  return "#" + channels.map((value) => value.toString(16).padStart(2, "0")).join("");
+  const { colour, colour_light: light } = get("methods").find((method) => method.name === name);
+  return document.documentElement.dataset.theme === "light" ? light : colour;
 }

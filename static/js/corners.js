@@ -1,22 +1,30 @@
-// The table of corners: one row each, for every method its position, deviations and ellipse area.
+// The table of corners: one row each, with position, deviations and ellipse area. A comparison begins with its answer:
+// how the ellipses of each method fit the scatter; the corners below are the detail.
 
+import { answerRows, drawAnswer } from "./answer.js";
 import { $, el, setText, swatch } from "./dom.js";
 import { selectableRows } from "./rows.js";
-import { select } from "./session.js";
+import { select } from "./actions.js";
 import { on } from "./store.js";
-import { degrees, metres, microseconds, millimetres, squareMillimetres, UNKNOWN } from "./units.js";
+import { degrees, metres, millimetres, squareMillimetres, UNKNOWN } from "./units.js";
 
-const QUANTITIES = [
+const PLACE = [
   { key: "x", label: "x", unit: "m", text: metres },
   { key: "y", label: "y", unit: "m", text: metres },
+];
+const CLAIMS = [
   { key: "sigma_x", label: "σx", unit: "mm", text: millimetres },
   { key: "sigma_y", label: "σy", unit: "mm", text: millimetres },
   { key: "area", label: "area", unit: "mm²", text: squareMillimetres },
-  { key: "angle", label: "angle", unit: "°", text: degrees, alone: true },
 ];
+const ANGLE = [{ key: "angle", label: "angle", unit: "°", text: degrees }];
 
-/** The columns of each method; what hardly differs between methods is left out of a comparison. */
-const quantitiesFor = (methods) => QUANTITIES.filter(({ alone }) => !alone || methods.length === 1);
+/** The columns: {method, quantity}; where a corner is and its angle are told once, by the first method that has it. */
+const columnsFor = (methods) => [
+  ...PLACE.map((quantity) => ({ quantity })),
+  ...methods.flatMap((method) => CLAIMS.map((quantity) => ({ method, quantity }))),
+  ...ANGLE.map((quantity) => ({ quantity })),
+];
 
 let columns = ""; // the methods the header is made for
 let rows;
@@ -24,23 +32,20 @@ let rows;
 export function mountCorners() {
   rows = selectableRows($("corner-table").tBodies[0], {
     name: (id) => `C${id}`,
-    cells: ({ methods }) =>
-      methods.flatMap(() => quantitiesFor(methods).map(({ key }) => el("td", { class: key }, ""))),
+    cells: ({ methods }) => columnsFor(methods).map(({ quantity }) => el("td", { class: quantity.key }, "")),
     fill,
     choose: (corner) => select({ corner }),
   });
   on(["frame", "methods"], draw);
   on(["selection"], ({ corner }) => rows.mark(corner));
+  on(["frame", "repeatability"], drawAnswer);
 }
 
 /** Selects the corner `by` rows further; the first or last one if none is selected. */
 export const nextCorner = (by) => rows.step(by);
 
-function draw({ methods, corners, timings }, known) {
+function draw({ methods, corners }, known) {
   if (methods.join() !== columns) makeHead(methods, known);
-  for (const cost of $("corner-table").tHead.querySelectorAll(".cost")) {
-    setText(cost, microseconds(timings.per_method[cost.dataset.method]));
-  }
   const sorted = [...corners].sort((a, b) => a.id - b.id);
   rows.update(sorted.map(({ id, by_method }) => ({ id, by_method, methods })));
   setText($("corner-count"), corners.length);
@@ -51,32 +56,28 @@ function makeHead(methods, known) {
   columns = methods.join();
   rows.update([]);
   $("corner-table").classList.toggle("compare", methods.length > 1);
-  const quantities = quantitiesFor(methods);
   const titles = new Map(known.map(({ name, title }) => [name, title]));
   const groups = methods.map((name) => {
     const title = titles.get(name) ?? name;
-    return el(
-      "th",
-      { scope: "colgroup", colSpan: quantities.length, class: "group", title },
-      swatch(name),
-      name,
-      el("output", { class: "cost", "data-method": name, title: "Time this method took for the scan" }),
-    );
+    return el("th", { scope: "colgroup", colSpan: CLAIMS.length, class: "group", title }, swatch(name), name);
   });
-  const heads = methods.flatMap(() =>
-    quantities.map(({ key, label, unit }) =>
-      el("th", { scope: "col", class: key }, label, el("span", { class: "unit" }, ` ${unit}`)),
-    ),
+  const heads = columnsFor(methods).map(({ quantity: { key, label, unit } }) =>
+    el("th", { scope: "col", class: key }, label, el("span", { class: "unit" }, ` ${unit}`)),
   );
-  const corner = el("th", { scope: "col", rowSpan: 2, class: "name" }, "Corner");
-  $("corner-table").tHead.replaceChildren(el("tr", {}, corner, ...groups), el("tr", {}, ...heads));
+  const answers = methods.length > 1 ? answerRows(methods, { before: PLACE.length, each: CLAIMS.length, after: ANGLE.length }) : [];
+  const corner = el("th", { scope: "col", rowSpan: 2 + answers.length, class: "name" }, "Corner");
+  const gap = (width) => el("td", { colSpan: width });
+  $("corner-table").tHead.replaceChildren(
+    el("tr", {}, corner, gap(PLACE.length), ...groups, gap(ANGLE.length)),
+    ...answers,
+    el("tr", {}, ...heads),
+  );
 }
 
 function fill(cells, { by_method, methods }) {
-  let cell = 0;
-  for (const method of methods) {
+  const first = methods.find((name) => by_method[name]);
+  columnsFor(methods).forEach(({ method = first, quantity: { key, text } }, at) => {
     const values = by_method[method];
-    for (const { key, text } of quantitiesFor(methods))
-      setText(cells[cell++], values ? text(values[key]) : UNKNOWN);
-  }
+    setText(cells[at], values ? text(values[key]) : UNKNOWN);
+  });
 }

@@ -3,7 +3,7 @@
 import { $, el, remake, setText } from "./dom.js";
 import { quantile } from "./history.js";
 import { isStale } from "./live.js";
-import { open, transport } from "./session.js";
+import { open, transport } from "./actions.js";
 import { get, on } from "./store.js";
 import { bytes, COMPLETE_HINT, degrees, fixed, milliseconds, percent, UNKNOWN, wholeNumber } from "./units.js";
 
@@ -41,17 +41,29 @@ const FIGURES = [
   {
     key: "overruns",
     label: "Overruns",
-    hint: "Revolutions that arrived, but the server was too busy to take them",
+    hint: "Revolutions that arrived while the server was too busy to process them",
     text: ({ overruns }) => overruns,
   },
 ];
 
 /** Why the decoder left something out, by the reasons the server counts. */
 const LOSSES = {
-  missing_packets: "Packets that never came, by the angle of the next one",
-  damaged_packets: "Packets that came with a wrong checksum",
-  unfit_packets: "Intact packets whose angle does not fit those around, as while the motor changes its speed",
-  garbage_bytes: "Bytes between packets that belong to none",
+  missing_packets: {
+    label: "Missing packets",
+    hint: "Packets that never arrived, inferred from the angle of the next one",
+  },
+  damaged_packets: {
+    label: "Damaged packets",
+    hint: "Packets with a wrong checksum",
+  },
+  unfit_packets: {
+    label: "Inconsistent packets",
+    hint: "Intact packets whose angle does not fit their neighbours, for example while the motor changes speed",
+  },
+  garbage_bytes: {
+    label: "Stray bytes",
+    hint: "Bytes between packets that belong to no packet",
+  },
 };
 
 const FACTS = [
@@ -60,6 +72,10 @@ const FACTS = [
   { label: "Serial", text: ({ serial }) => serial },
   { label: "Firmware", text: ({ firmware, hardware }) => `${firmware}, hardware ${hardware}` },
   { label: "Health", text: ({ health }) => health },
+  {
+    label: "Checksum",
+    text: ({ checked }) => (checked ? "in every packet" : "none in this mode: a wrong distance goes unnoticed"),
+  },
   { label: "Baud", text: ({ baud }) => wholeNumber(baud) },
 ];
 
@@ -109,9 +125,9 @@ function draw({ device }, connection) {
   const lost = lostText(get("frame")?.gaps ?? []);
   remake($("device-losses"), [losses, lost], () => [
     ...losses.map(([reason, count]) =>
-      line(`Dropped, ${reason.replaceAll("_", " ")}`, wholeNumber(count), LOSSES[reason]),
+      line(LOSSES[reason]?.label ?? reason, wholeNumber(count), LOSSES[reason]?.hint),
     ),
-    line("Lost in this scan", lost, "Sectors of the turn shown from which nothing arrived"),
+    line("Lost in this scan", lost, "Sectors of this revolution from which no data arrived"),
   ]);
   remake(
     $("device-facts"),

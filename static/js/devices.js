@@ -2,7 +2,7 @@
 
 import { request } from "./api.js";
 import { $, el, iconButton, remake } from "./dom.js";
-import { attempt, open } from "./session.js";
+import { attempt, open } from "./actions.js";
 import { on, set } from "./store.js";
 
 const NOTHING = "n/a"; // as a system describes a port it knows nothing of
@@ -10,7 +10,7 @@ const NOTHING = "n/a"; // as a system describes a port it knows nothing of
 export function mountDevices() {
   $("devices")
     .querySelector(".section-head")
-    .append(iconButton("rotate", "Look for devices again", refresh));
+    .append(iconButton("reload", "Look for devices again", refresh));
   on(["panel"], (panel) => panel === "sources" && refresh());
   on(["devices", "source"], (devices, { kind, device }) => {
     const current = kind === "device" ? device?.port : null;

@@ -2,7 +2,7 @@
 
 import { request } from "./api.js";
 import { $, el } from "./dom.js";
-import { attempt, open } from "./session.js";
+import { attempt, open } from "./actions.js";
 import { get, on } from "./store.js";
 import { toast } from "./toasts.js";
 
@@ -20,7 +20,7 @@ export function mountFaults() {
     el("button", { type: "button", onclick: () => disturb(commands) }, label),
   );
   $("faults").append(
-    el("p", { class: "muted" }, "Done to the emulated lidar; shares are of its data packets."),
+    el("p", { class: "muted" }, "Faults of the emulated lidar, to see how the driver and this page cope. Percentages are of its data packets."),
     el("div", { class: "fault-buttons" }, ...buttons),
   );
   on(["source"], ({ kind }) => ($("faults").hidden = kind !== "emulator"));
@@ -29,7 +29,7 @@ export function mountFaults() {
 /** An emulator that has ended can bear no fault; another one can be had. */
 function disturb(commands) {
   const { error } = get("source");
-  if (!error) return attempt(() => sendAll(commands), "The emulator did not do that");
+  if (!error) return attempt(() => sendAll(commands), "The fault could not be applied");
   const action = { label: "Start a new one", run: () => open({ kind: "emulator" }) };
   return toast(error, { title: "The emulator has ended", kind: "error", action, about: "source" });
 }

@@ -2,7 +2,7 @@
 
 import { $, el } from "./dom.js";
 import { parameterRow } from "./parameters.js";
-import { changeSetting } from "./session.js";
+import { changeSetting } from "./actions.js";
 import { on } from "./store.js";
 
 const FILTER = "navigation.filter.";

@@ -13,8 +13,8 @@ const CONNECTION = { connecting: "Connecting", open: "Connected", lost: "Connect
 const READOUTS = [
   {
     key: "frame",
-    label: "Frame",
-    hint: "Scans worked on since the server started",
+    label: "Scans",
+    hint: "Scans processed since the server started: where it stands still, nothing comes",
     text: ({ frame }) => frame.sequence,
   },
   {
@@ -47,7 +47,7 @@ const READOUTS = [
   {
     key: "beams",
     label: "Beams",
-    hint: "Beams with a return, of all in this scan",
+    hint: "Beams with a return, of all beams in this scan",
     text: ({ frame }) => `${frame.n_valid}\u2009/\u2009${frame.n_beams}`,
   },
   { key: "segments", label: "Segments", text: ({ frame }) => frame.segments[frame.fitter]?.length ?? 0 },
@@ -55,7 +55,7 @@ const READOUTS = [
   {
     key: "dropped",
     label: "Dropped",
-    hint: "Scans not shown: overtaken by a newer one while the server was busy",
+    hint: "Scans skipped because a newer one arrived while the server was busy",
     text: ({ frame }) => frame.dropped,
   },
 ];
@@ -64,7 +64,12 @@ export function mountHeader() {
   $("readouts").append(
     sourceReadout(),
     ...READOUTS.map(readout),
+    noiseRemark(),
   );
+  on(["frame"], ({ noise_remark: remark }) => {
+    $("noise-remark").parentElement.hidden = !remark;
+    setText($("noise-remark"), remark ? `${remark} Calibrate` : "");
+  });
   on(["frame", "source", "connection"], (frame, source, connection) => {
     const stale = isStale(source, connection);
     $("readouts").classList.toggle("stale", stale);
@@ -89,6 +94,22 @@ function sourceReadout() {
   const onclick = () => showPanel("sources", { focus: true });
   const name = el("button", { type: "button", id: "readout-source", class: "state", onclick }, UNKNOWN);
   return el("div", { class: "readout source-readout" }, el("dt", {}, "Source"), el("dd", {}, name));
+}
+
+/** Where what is seen contradicts what is set; it leads to the calibration. */
+function noiseRemark() {
+  const onclick = () => {
+    showPanel("setup", { focus: true });
+    $("calibration")?.scrollIntoView({ block: "start" });
+  };
+  const text = el("button", { type: "button", id: "noise-remark", class: "state", onclick });
+  const title = "The ellipses follow from the noise that is set, so they are wrong if it is";
+  return el(
+    "div",
+    { class: "readout noise-readout", title, hidden: true },
+    el("dt", {}, "Noise"),
+    el("dd", {}, text),
+  );
 }
 
 function drawSource(source, connection) {

@@ -5,7 +5,7 @@ import { token } from "./chart.js";
 import { $, el, iconButton, remake } from "./dom.js";
 import { line, makeFigure, stroke } from "./figure.js";
 import { longestSigma } from "./pose.js";
-import { select } from "./session.js";
+import { select } from "./actions.js";
 import { get, on } from "./store.js";
 import { fixed, metres, millimetres, moment, squareMillimetres, wholeNumber } from "./units.js";
 
@@ -82,7 +82,7 @@ function historyOf({ x, y, history }) {
   ];
   const dots = history.length < 3;
   return {
-    title: "Where it was, mm from where it is",
+    title: "Earlier positions relative to the present one, mm",
     series: [
       line({ label: "y", key: "across", tone: "--across", dots }),
       line({ label: "x", key: "along", tone: "--along", dots }),

@@ -2,10 +2,10 @@
 
 import { request } from "./api.js";
 import { $, el, setText } from "./dom.js";
-import { paced } from "./pace.js";
+import { throttled } from "./throttle.js";
 import { longestSigma } from "./pose.js";
 import { selectableRows } from "./rows.js";
-import { attempt, select, setting } from "./session.js";
+import { attempt, select, setting } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { ago, metres, millimetres, wholeNumber } from "./units.js";
 
@@ -39,7 +39,7 @@ export function mountLandmarks() {
   on(["connection"], (connection) => connection === "open" && reloadLandmarks());
   on(["localization"], (localization) => follow(localization.session));
   on(["frame"], noteSeen);
-  const fill = paced(REDRAW_MS, drawTable);
+  const fill = throttled(REDRAW_MS, drawTable);
   on(["landmarks"], ({ size }) => setText($("landmark-count"), `${wholeNumber(size)}${isPart ? "+" : ""}`));
   on(["landmarks", "frame", "panel"], (landmarks, _, panel) => panel === "map" && fill(landmarks));
   on(["selection"], ({ landmark }) => rows.mark(landmark));
@@ -99,7 +99,7 @@ function drawTable(landmarks) {
 }
 
 function note(count) {
-  if (count > MOST || isPart) return `The first ${MOST}. All are in what you save, and in the API.`;
+  if (count > MOST || isPart) return `Only the first ${MOST} are shown; saved files and the API have all of them.`;
   if (count) return "";
   const isBuilt = session !== null || setting("navigation.mode") === "slam";
   return isBuilt ? "No landmark is confirmed yet." : "There is no map. Switch to SLAM to build one.";

@@ -3,7 +3,7 @@
 
 import { isExtractionNumber } from "./parameters.js";
 import { merge } from "./optimistic.js";
-import { open, settings as session, transport } from "./session.js";
+import { open, settings, transport } from "./actions.js";
 import { get, on } from "./store.js";
 
 const WRITE_MS = 500;
@@ -20,6 +20,7 @@ const NAMED = {
   colour: { path: "view.colour", read: String },
   scale: { path: "view.ellipse_scale", read: Number },
   mode: { path: "navigation.mode", read: String },
+  method: { path: "navigation.method", read: String },
   landmarks: { path: "navigation.landmarks", read: String },
   motion: { path: "navigation.motion", read: String },
   clusters: { path: "clusters.method", read: String },
@@ -48,6 +49,9 @@ function carried(fields) {
 
 const layersOf = (fields) => fields.filter(({ path }) => path.startsWith(LAYERS));
 
+/** Six digits tell any setting; more are what conversions left over. */
+const rounded = (value) => (typeof value === "number" ? Number(value.toPrecision(6)) : value);
+
 /** The hash for a state of the page, without "#". */
 function encode(source, settings, fields) {
   const link = new URLSearchParams();
@@ -58,7 +62,7 @@ function encode(source, settings, fields) {
   } else link.set("live", source.kind);
   for (const { name, path, preset } of carried(fields)) {
     const value = at(settings, path);
-    if (String(value) !== String(preset)) link.set(name, value);
+    if (String(rounded(value)) !== String(preset)) link.set(name, rounded(value));
   }
   const layers = layersOf(fields);
   const shown = layers.filter(({ path }) => at(settings, path)).map(({ key }) => key);
@@ -104,10 +108,10 @@ export async function mountLink() {
 async function follow({ reloaded }) {
   const wanted = decode(location.hash, get("fields"));
   if (!wanted || (reloaded && isOpen(wanted.source))) return;
-  await session.patch(wanted.settings);
   if (isOpen(wanted.source)) {
     if (wanted.source.paused) await transport.patch({ state: "paused", index: wanted.source.index });
   } else await open(wanted.source);
+  await settings.patch(wanted.settings); // last: a source that is opened brings along the noise of its sensor
 }
 
 /** A live view is whatever is live now: nobody's lidar is taken away by an address. */

@@ -11,7 +11,7 @@ const DEVICE_STATES = {
   connecting: "Connecting",
   streaming: "Streaming",
   stalled: "Stalled, no data arrives",
-  reconnecting: "Reconnecting by itself once the lidar is back",
+  reconnecting: "Disconnected, reconnects when the lidar is back",
   closed: "Closed",
 };
 
@@ -20,7 +20,7 @@ const PLAYER_STATES = {
   playing: "Playing",
   paused: "Paused",
   ended: "Ended",
-  error: "Cannot be read on",
+  error: "Stopped at an error",
 };
 
 export function nameOf({ kind, recording, device }) {
@@ -40,7 +40,7 @@ export const isStale = ({ device }, connection) =>
 
 /** The same as the dots in words; a live source goes on while the page is paused. */
 export function stateText({ device, state }, connection) {
-  if (connection === "lost") return "Not known, the connection is lost";
+  if (connection === "lost") return "Unknown, the connection is lost";
   if (!device) return PLAYER_STATES[state] ?? state;
   const text = DEVICE_STATES[device.state] ?? device.state;
   return state === "paused" && device.state === "streaming" ? `${text}, the page is paused` : text;

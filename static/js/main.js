@@ -1,4 +1,4 @@
-// The page, wired together: rooms are mounted, then the stream feeds the store they read from.
+// The page, wired together: modules are mounted, then the stream feeds the store they read from.
 
 import { request } from "./api.js";
 import { mountCalibration } from "./calibration.js";
@@ -12,21 +12,23 @@ import { mountFaults } from "./faults.js";
 import { mountFilter } from "./filter.js";
 import { mountHeader } from "./header.js";
 import { forget, remember } from "./history.js";
+import { mountInspector } from "./inspector.js";
 import { mountLandmark } from "./landmark.js";
 import { mountLandmarks, receiveLandmarks } from "./landmarks.js";
 import { mountLink } from "./link.js";
 import { mountMaps } from "./maps.js";
 import { mountMethod } from "./method.js";
 import { mountNavigation } from "./navigation.js";
+import { mountOverlay } from "./overlay/overlay.js";
 import { mountParameters } from "./parameters.js";
 import { mountPlots } from "./plots.js";
 import { mountRecordings } from "./recordings.js";
 import { mountRejections } from "./rejections.js";
 import { mountRepeatability } from "./repeatability.js";
-import { beginsAnew } from "./run.js";
+import { isNewRun } from "./run.js";
 import { fitScene, mountScene } from "./scene.js";
 import { fieldsOf } from "./schema.js";
-import { attempt, isPlaying, settings, transport } from "./session.js";
+import { attempt, isPlaying, settings, transport } from "./actions.js";
 import { mountShortcuts, press } from "./shortcuts.js";
 import { mountSimulation } from "./simulation.js";
 import { mountSource } from "./source.js";
@@ -38,12 +40,14 @@ import { mountTimeline } from "./timeline.js";
 import { clearToasts } from "./toasts.js";
 import { mountUpload } from "./upload.js";
 import { mountView } from "./view.js";
+import { mountWelcome } from "./welcome.js";
 
 mountTheme();
 mountColours();
 mountTabs();
 mountHeader();
 mountScene(press);
+mountOverlay();
 mountDial();
 mountTimeline();
 mountMethod();
@@ -59,6 +63,7 @@ mountFilter();
 mountCorners();
 mountPlots();
 mountRepeatability();
+mountInspector();
 mountSource();
 mountSimulation();
 mountDevice();
@@ -68,8 +73,10 @@ mountRecordings();
 mountUpload();
 mountRejections();
 mountShortcuts();
+mountWelcome();
 
 set("opening", null);
+set("wall", null);
 connect({ onOpen: join, onState: accept, onFrame: show, onLandmarks: receiveLandmarks });
 
 let joining; // no frame has come yet over this connection
@@ -117,9 +124,9 @@ function accept(state) {
 
 /** A frame is late by more than its way here if it comes first over a connection, again, or while paused. */
 function show(frame) {
-  if (beginsAnew(frame)) {
+  if (isNewRun(frame)) {
     forget();
-    fitScene();
+    fitScene(frame);
   }
   const isNew = frame.stamp !== get("frame")?.stamp;
   remember(frame, isNew && !joining && isPlaying(get("source")));

@@ -3,11 +3,12 @@
 import { address, request, send } from "./api.js";
 import { $, el, icon, iconButton, remake } from "./dom.js";
 import { reloadLandmarks } from "./landmarks.js";
-import { attempt, changeSetting } from "./session.js";
+import { attempt, changeSetting } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { QUESTION_MS, toast } from "./toasts.js";
 import { moment, wholeNumber } from "./units.js";
 
+const BUILDING = { zip: "ROS map, walls and plan", png: "Picture" };
 const FORMATS = { json: "JSON", csv: "CSV", geojson: "GeoJSON", png: "Picture", zip: "ROS map" };
 const LOADED = ["json", "csv", "geojson"];
 
@@ -42,7 +43,7 @@ export function mountMaps() {
   );
   on(["panel", "localization"], refresh);
   on(["maps", "localization", "landmarks"], draw);
-  on(["localization"], offer);
+  on(["localization", "settings"], offer);
 }
 
 let listed = ""; // when the maps were asked for: with which panel open and which map in use
@@ -64,8 +65,10 @@ function draw({ sessions, store }, { session }, landmarks) {
 }
 
 /** What is saved and cleared is the map that is built or localized in. */
-function offer({ session }) {
-  remake($("map-save"), [session], () => (session === null ? [nothingToSave()] : saveLinks(session)));
+function offer({ session }, { navigation: { mode, method } }) {
+  const isOfScans = mode === "slam" && method === "scans";
+  const links = () => (session === null ? [nothingToSave()] : saveLinks(session));
+  remake($("map-save"), [session, isOfScans], () => (isOfScans ? buildingLinks() : links()));
   clearButton.disabled = session === null;
 }
 
@@ -101,26 +104,31 @@ function row({ id, source, mode, started, landmarks }, live) {
 const nothingToSave = () =>
   el("p", { class: "muted" }, "Nothing to save or clear: no map is built or localized in.");
 
+const buildingLinks = () => [
+  el("p", { class: "muted" }, "Save the map of the building as"),
+  ...Object.entries(BUILDING).map(([format, name]) =>
+    saveLink(`map/grid?format=${format}`, `map.${format}`, name, "the map of the building"),
+  ),
+];
+
 const saveLinks = (session) => [
   el("p", { class: "muted" }, `Save map ${session} as`),
   ...Object.entries(FORMATS).map(([format, name]) =>
-    el(
-      "a",
-      {
-        class: "button",
-        href: address(`map?format=${format}&session=${session}`).href,
-        download: `map-${session}.${format}`,
-        "aria-label": `Save map ${session} as ${name}`,
-      },
-      name,
-    ),
+    saveLink(`map?format=${format}&session=${session}`, `map-${session}.${format}`, name, `map ${session}`),
   ),
 ];
+
+const saveLink = (path, download, name, what) =>
+  el(
+    "a",
+    { class: "button", href: address(path).href, download, "aria-label": `Save ${what} as ${name}` },
+    name,
+  );
 
 async function localizeIn(session) {
   const chosen = await attempt(
     () => request("PUT", "localization/map", { session }),
-    "The map was not taken",
+    "The map could not be chosen",
   );
   if (chosen) await changeSetting("navigation.mode", "localize");
 }
@@ -130,7 +138,7 @@ function confirmDelete(session, count) {
     await attempt(() => request("DELETE", `sessions/${session}`), "The map was not deleted");
     await list();
   };
-  toast(`Its ${wholeNumber(count)} landmarks and their history go with it.`, {
+  toast(`This also deletes its ${wholeNumber(count)} landmarks and their history.`, {
     title: `Delete map ${session}?`,
     action: { label: "Delete", run: remove },
     linger: QUESTION_MS,
@@ -144,7 +152,7 @@ function confirmClear(session) {
     await request("DELETE", `landmarks?session=${session}`);
     await Promise.all([list(), reloadLandmarks()]);
   };
-  toast("Its landmarks and their history are given up; SLAM begins with an empty map.", {
+  toast("This deletes its landmarks and their history. SLAM starts again with an empty map.", {
     title: `Clear map ${session}?`,
     action: { label: "Clear", run: () => attempt(clear, "The map was not cleared") },
     linger: QUESTION_MS,
@@ -158,7 +166,7 @@ async function load(file) {
     format: LOADED.includes(format) ? format : LOADED[0],
     name: file.name,
   });
-  const loaded = await attempt(() => send("POST", `map?${query}`, { body: file }), "The map was not taken");
+  const loaded = await attempt(() => send("POST", `map?${query}`, { body: file }), "The map could not be loaded");
   if (!loaded) return;
   await list();
   const action = { label: "Localize in it", run: () => localizeIn(loaded.id) };

@@ -2,7 +2,7 @@
 
 import { bind, idOf, segmentedRow, switchRow } from "./bindings.js";
 import { $, el, setText, swatch } from "./dom.js";
-import { changeSetting, setting } from "./session.js";
+import { changeSetting, setting } from "./actions.js";
 import { get, on } from "./store.js";
 import { capital } from "./units.js";
 

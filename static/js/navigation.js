@@ -1,15 +1,15 @@
 // Whether and how the sensor's pose is estimated: in which map, by which landmarks, from which motion.
 
 import { request } from "./api.js";
-import { segmentedRow } from "./bindings.js";
+import { choiceRow, segmentedRow } from "./bindings.js";
 import { $, el, setText } from "./dom.js";
 import { forget } from "./history.js";
 import { placingControls } from "./placing.js";
-import { attempt, changeSetting, setting } from "./session.js";
+import { attempt, changeSetting, setting, settings } from "./actions.js";
 import { on } from "./store.js";
 import { showPanel } from "./tabs.js";
 import { layerChips } from "./view.js";
-import { whereabouts } from "./whereabouts.js";
+import { posePanel } from "./pose-panel.js";
 
 const MODES = { off: "Off", slam: "SLAM", localize: "Localize" };
 
@@ -23,16 +23,38 @@ const MOTION_HINT =
   "What predicts the pose between scans. Auto: odometry when the source has it, else the velocity estimated so far";
 
 const ABOUT = {
-  off: "The sensor is taken to stand still, and the scene shows what it sees.",
-  slam: "Builds a map of landmarks and finds the sensor in it at the same time.",
-  localize: "Finds the sensor in a map that was built before.",
+  off: "The pose is not estimated. The scene shows the scan in the sensor frame.",
+  slam: "Builds a map and finds the sensor in it at the same time.",
+  localize: "Finds the sensor in an existing map.",
 };
+
+const METHODS = [
+  ["scans", "Whole scans"],
+  ["corners", "Corners"],
+  ["clusters", "Clusters"],
+];
+
+const METHOD_HINT =
+  "What SLAM finds the pose by. Whole scans: each is laid on the last ones, and the map becomes a grid with walls. Corners and clusters: an extended Kalman filter on landmarks";
+
+/** What SLAM finds the pose by: whole scans, or landmarks of a kind. */
+const method = {
+  value: () => (setting("navigation.method") === "scans" ? "scans" : setting("navigation.landmarks")),
+  change: (value) =>
+    settings.patch({
+      navigation: value === "scans" ? { method: "scans" } : { method: "landmarks", landmarks: value },
+    }),
+};
+
+const methodRow = choiceRow("Method", "slam-method", METHODS, method, { title: METHOD_HINT });
+const landmarksRow = segmentedRow("Landmarks", "navigation.landmarks", METHODS.slice(1));
+const motionRow = segmentedRow("Motion", "navigation.motion", MOTIONS, { title: MOTION_HINT });
 
 const reset = el(
   "button",
   {
     type: "button",
-    title: "SLAM begins with an empty map, localization with no idea of the pose",
+    title: "SLAM starts over with an empty map, localization with an unknown pose",
     onclick: () => attempt(begin, "The filter was not reset"),
   },
   "Reset",
@@ -53,23 +75,25 @@ export function mountNavigation() {
   $("navigation").append(
     segmentedRow("Mode", "navigation.mode", Object.entries(MODES), { "aria-describedby": "mode-about" }),
     el("p", { class: "muted about", id: "mode-about" }),
-    segmentedRow("Landmarks", "navigation.landmarks", [
-      ["corners", "Corners"],
-      ["clusters", "Clusters"],
-    ]),
+    methodRow,
+    landmarksRow,
     el(
       "p",
       { class: "muted", id: "cluster-hint" },
-      "Walls make no good landmarks; posts, legs and trunks do. What finds them: ",
+      "Posts, legs and trunks make good cluster landmarks; walls do not. Choose the clustering method in ",
       el("button", { type: "button", class: "link", onclick: showClusters }, "Setup, Clusters"),
     ),
-    segmentedRow("Motion", "navigation.motion", MOTIONS, { title: MOTION_HINT }),
-    whereabouts(),
+    motionRow,
+    posePanel(),
     el("div", { class: "buttons" }, ...placingControls(), reset),
   );
   on(["fields"], (fields) => $("navigation").append(layerChips(fields, { ofMap: true })));
   on(["settings"], ({ navigation: { mode, landmarks } }) => {
-    $("cluster-hint").hidden = landmarks !== "clusters";
+    const wholeScans = mode === "slam" && method.value() === "scans";
+    methodRow.hidden = mode === "localize";
+    landmarksRow.hidden = mode !== "localize";
+    motionRow.hidden = wholeScans;
+    $("cluster-hint").hidden = wholeScans || landmarks !== "clusters";
     setText($("mode-about"), ABOUT[mode]);
     reset.disabled = mode === "off";
   });

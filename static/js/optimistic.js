@@ -15,15 +15,15 @@ export function merge(target, change) {
 
 const isObject = (value) => value !== null && typeof value === "object" && !Array.isArray(value);
 
-/** `send(change)` resolves to the whole new object, which is kept in the store under `key`. */
-export function optimistic(key, send) {
+/** `send(change)` resolves to the whole new object, which is kept in the store under `key` as `shown` makes it. */
+export function optimistic(key, send, shown = (value) => value) {
   let server;
   let sending = null;
   let queued = null;
   let pushes = 0;
 
   const pending = () => merge(sending ?? {}, queued ?? {});
-  const publish = () => server && set(key, merge(server, pending()));
+  const publish = () => server && set(key, shown(merge(server, pending())));
 
   async function drain() {
     while (queued) {
@@ -54,5 +54,6 @@ export function optimistic(key, send) {
       if (!sending) await drain();
     },
     pending,
+    publish,
   };
 }

@@ -2,7 +2,7 @@
 
 import { bind, idOf } from "./bindings.js";
 import { $, el, setText } from "./dom.js";
-import { setting, settings } from "./session.js";
+import { setting, settings } from "./actions.js";
 import { get, on } from "./store.js";
 import { displayOf } from "./units.js";
 
@@ -10,7 +10,14 @@ const STEPS = 400;
 const FLATTEST = 0.1; // power of a slider: below it, the end is all there is to choose
 const LARGEST = 1e6; // of a slider's values
 const MUCH_MORE = 1.5; // times the noise told: beyond what one scan's estimate is off by chance
-const NOISE_LABELS = { sigma_range: "Range", sigma_bearing: "Bearing" };
+const NOISE_LABELS = {
+  sigma_range: "Range",
+  sigma_bearing: "Bearing",
+  range_growth: "Growth with range",
+  unevenness: "Unevenness",
+  unevenness_length: "Its length",
+  systematic: "Systematic",
+};
 
 export function mountParameters() {
   on(["fields"], (fields) => {
@@ -29,7 +36,7 @@ export function mountParameters() {
   on(["frame", "settings", "fields"], (frame) => {
     const told = setting("extraction.noise.sigma_range");
     const doubt =
-      frame.noise_seen > MUCH_MORE * told ? ": more than told, so the ellipses claim too much" : "";
+      frame.noise_seen > MUCH_MORE * told ? ": more than the setting, so the ellipses are too small" : "";
     setText(
       $("noise-seen"),
       `Range noise seen in this scan: ${(1e3 * frame.noise_seen).toFixed(1)} mm${doubt}.`,
@@ -48,8 +55,18 @@ const isNoise = ({ path }) => path.includes(".noise.");
 
 const isDefault = (field) => setting(field.path) === field.default;
 
+/** Few need these; the others come first. */
+const FOR_EXPERTS = ["split_threshold", "gap", "corner_angle", "range_growth", "unevenness", "unevenness_length", "systematic", "tails", "renewal", "resampling"];
+
 function fill(section, fields) {
-  section.replaceChildren(section.querySelector("h2"), ...fields.map((field) => parameterRow(field)));
+  const isFolded = ({ key }) => FOR_EXPERTS.includes(key);
+  const rows = (chosen) => chosen.map((field) => parameterRow(field));
+  const heading = section.querySelector("h2");
+  section.replaceChildren(
+    heading,
+    ...rows(fields.filter((field) => !isFolded(field))),
+    el("details", {}, el("summary", { "aria-label": `For experts: ${heading.textContent}` }, "For experts"), ...rows(fields.filter(isFolded))),
+  );
 }
 
 /** A row of label, slider, number and unit for one numeric field of the schema; `empty` says what none means. */
@@ -103,7 +120,7 @@ function slider(field, minimum, { unit, text, model }) {
     range.setAttribute("aria-valuetext", `${text(value)} ${unit}`);
     return positionOf(value);
   };
-  const range = el("input", { type: "range", min: "0", max: String(STEPS), "aria-label": field.label });
+  const range = el("input", { type: "range", min: "0", max: String(STEPS), "aria-label": `${field.label} slider` });
   return bind(range, field.path, { show, read: (position) => read(Number(position)), model });
 }
 

@@ -3,7 +3,7 @@
 import { request } from "./api.js";
 import { $, el, setText } from "./dom.js";
 import { onSceneMessage, view } from "./scene.js";
-import { attempt } from "./session.js";
+import { attempt } from "./actions.js";
 import { get, on } from "./store.js";
 
 const HINT = "Press where the sensor is and drag to where it looks";
@@ -54,7 +54,8 @@ export function placingControls() {
   setText($("place-hint"), HINT);
   onSceneMessage("pose", place);
   on(["settings"], ({ navigation }) => {
-    button.disabled = navigation.mode === "off";
+    const { mode, method } = navigation;
+    button.disabled = mode === "off" || (mode === "slam" && method === "scans");
     if (placing && button.disabled) setPlacing(false);
   });
   return [button, form];
@@ -93,5 +94,5 @@ function submit(event) {
 
 async function place({ x, y, heading }) {
   setPlacing(false);
-  await attempt(() => request("POST", "pose", { x, y, heading }), "The pose was not taken");
+  await attempt(() => request("POST", "pose", { x, y, heading }), "The pose could not be set");
 }

@@ -6,7 +6,7 @@ import { methodColour } from "./colours.js";
 import { $, swatch } from "./dom.js";
 import { line, makeFigure, stroke } from "./figure.js";
 import { columns } from "./history.js";
-import { paced } from "./pace.js";
+import { throttled } from "./throttle.js";
 import { errorOf, positionSigma } from "./pose.js";
 import { on } from "./store.js";
 import { fixed, microseconds, squareMillimetres, wholeMillimetres } from "./units.js";
@@ -80,7 +80,7 @@ let figures = [];
 let made = "";
 
 export function mountPlots() {
-  const draw = paced(REDRAW_MS, redraw);
+  const draw = throttled(REDRAW_MS, redraw);
   on(["frame", "panel", "settings", "methods"], (frame, panel) => panel === "plots" && draw(frame));
 }
 

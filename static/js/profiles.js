@@ -2,7 +2,7 @@
 
 import { Problem, address, request, send } from "./api.js";
 import { $, el, icon, iconButton, remake } from "./dom.js";
-import { attempt, settings } from "./session.js";
+import { attempt, settings } from "./actions.js";
 import { on, set } from "./store.js";
 import { QUESTION_MS, report, toast } from "./toasts.js";
 import { fixed } from "./units.js";
@@ -39,8 +39,7 @@ export async function listProfiles() {
   if (found) set("profiles", found);
 }
 
-export const sameNoise = (one, other) =>
-  one.sigma_range === other.sigma_range && one.sigma_bearing === other.sigma_bearing;
+export const sameNoise = (one, other) => Object.keys(one).every((part) => one[part] === other[part]);
 
 /** Lets extraction take this noise. */
 export const useNoise = (noise) => settings.patch({ extraction: { noise } });
@@ -64,29 +63,48 @@ async function put(name, body, overwrite = false) {
 /** What is wrong with the content of a file comes with `errors`, and is told as the list of profiles tells it. */
 function inWords(problem) {
   if (!problem.members?.errors) return problem;
-  return new Problem({ ...problem, detail: `The file is no profile: ${problem.message.replace(/^\/: /, "")}.` });
+  return new Problem({ ...problem, detail: `The file is not a profile: ${problem.message}.` });
 }
 
 const pathOf = (name) => `profiles/${encodeURIComponent(name)}`;
 
 function offerOverwrite(name, body) {
   const action = { label: "Replace it", run: () => put(name, body, true) };
-  toast(`There is a profile ${name} already.`, { title: "Not saved", action, linger: QUESTION_MS });
+  toast(`A profile named ${name} already exists.`, { title: "Not saved", action, linger: QUESTION_MS });
 }
 
 async function load(file) {
   if (file) await put(file.name.replace(/\.json$/i, ""), await file.text());
 }
 
-function draw({ folder, profiles }, { extraction: { noise } }) {
-  remake($("profile-list"), [folder, profiles, noise], () =>
-    profiles.length
+function draw({ folder, profiles, sensors }, { extraction: { noise } }) {
+  remake($("profile-list"), [folder, profiles, noise], () => [
+    ...(profiles.length
       ? [
           el("ul", { class: "entries" }, ...profiles.map((profile) => row(profile, noise))),
           el("p", { class: "muted" }, `Files in ${folder}; commands take one as `, el("code", {}, "--settings")),
         ]
-      : [el("p", { class: "muted" }, "None yet: calibrate and save, or import a file.")],
+      : [el("p", { class: "muted" }, "None yet: calibrate and save, or import a file.")]),
+    el("h3", {}, "Usual noise of known sensors, until yours is calibrated"),
+    el("ul", { class: "entries" }, ...sensors.map((sensor) => usual(sensor, noise))),
+  ]);
+}
+
+/** A kind of sensor; what its numbers rest on shows under the one in use, and as a tooltip. */
+function usual({ name, title, noise, rests_on: basis }, current) {
+  const inUse = sameNoise(noise, current);
+  return el("li", {}, choice(name, title, noise, inUse, basis), inUse ? el("p", { class: "about muted" }, basis) : "");
+}
+
+function choice(key, text, noise, inUse, title) {
+  const button = el(
+    "button",
+    { type: "button", class: "entry", title, "data-key": `profile-${key}`, onclick: () => useNoise(noise) },
+    el("span", {}, text),
+    el("small", {}, `${inUse ? "in use, " : ""}${numbers(noise)}`),
   );
+  if (inUse) button.setAttribute("aria-current", "true");
+  return button;
 }
 
 function row({ name, noise, problem }, current) {
@@ -95,20 +113,7 @@ function row({ name, noise, problem }, current) {
     const entry = el("p", { class: "entry" }, el("span", {}, name), el("small", { class: "fault" }, "damaged"));
     return el("li", {}, entry, remove, el("p", { class: "about muted" }, problem));
   }
-  const inUse = sameNoise(noise, current);
-  const button = el(
-    "button",
-    {
-      type: "button",
-      class: "entry",
-      title: `Use profile ${name}`,
-      "data-key": `profile-${name}`,
-      onclick: () => useNoise(noise),
-    },
-    el("span", {}, name),
-    el("small", {}, `${inUse ? "in use, " : ""}${numbers(noise)}`),
-  );
-  if (inUse) button.setAttribute("aria-current", "true");
+  const button = choice(name, name, noise, sameNoise(noise, current), `Use profile ${name}`);
   return el("li", {}, button, exportLink(name), remove);
 }
 
@@ -132,7 +137,7 @@ function confirmDelete(name) {
     await attempt(() => request("DELETE", pathOf(name)), "The profile was not deleted");
     await listProfiles();
   };
-  toast("The noise that is set stays.", {
+  toast("The noise settings stay as they are.", {
     title: `Delete profile ${name}?`,
     action: { label: "Delete", run: remove },
     linger: QUESTION_MS,

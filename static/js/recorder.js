@@ -3,7 +3,7 @@
 import { request } from "./api.js";
 import { $, el, setText } from "./dom.js";
 import { refreshRecordings } from "./recordings.js";
-import { attempt, open } from "./session.js";
+import { attempt, open } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { toast } from "./toasts.js";
 import { bytes, clock } from "./units.js";
@@ -52,7 +52,7 @@ function draw(recorder, { live }) {
 
 function hint(running, live, name) {
   if (running) return `Stop recording ${name} (W)`;
-  return live ? "Record what plays (W)" : "Only what is live can be recorded";
+  return live ? "Record the live source (W)" : "Only a live source can be recorded";
 }
 
 /** Two short lines. */
@@ -71,7 +71,7 @@ function tell(recorder) {
   refreshRecordings();
   if (recorder.name) offer(recorder);
   else
-    toast(`What was written of ${recorded} is in the library.`, { title: "Recording ended with the server" });
+    toast(`The part of ${recorded} that was written is in the recordings folder.`, { title: "Recording ended with the server" });
 }
 
 function offer(recorder) {

@@ -1,64 +1,150 @@
-// The recordings that can be played: those in the server's folder, and the one that comes with the program.
+// The recordings that can be played: those in the server's folder, and the ones that come with the program. Each is
+// played, downloaded, renamed or deleted here; what was deleted can be taken back for a while.
 
-import { request } from "./api.js";
-import { $, el, iconButton, remake } from "./dom.js";
-import { attempt, open } from "./session.js";
-import { on, set } from "./store.js";
-import { QUESTION_MS, toast } from "./toasts.js";
-import { bytes } from "./units.js";
+import { address, request } from "./api.js";
+import { $, el, icon, iconButton, remake } from "./dom.js";
+import { attempt, open } from "./actions.js";
+import { get, on, set } from "./store.js";
+import { toast } from "./toasts.js";
+import { bytes, duration } from "./units.js";
 
 export function mountRecordings() {
-  on(["recordings", "source", "recorder"], drawLibrary);
+  on(["recordings", "source", "recorder", "recordingFacts", "renaming"], drawLibrary);
   on(["panel"], (panel) => panel === "sources" && refreshRecordings());
+  set("recordingFacts", {});
+  set("renaming", null);
 }
 
 export async function refreshRecordings() {
   const listing = await attempt(() => request("GET", "recordings"), "The recordings could not be listed");
-  if (listing) set("recordings", listing);
+  if (!listing) return;
+  set("recordings", listing);
+  learn(listing.recordings);
 }
 
-function drawLibrary({ folder, recordings }, source, recorder) {
-  const playing = source.recording;
-  const growing = recorder.state === "recording" ? stem(recorder.name) : null;
-  remake($("library-list"), [folder, recordings, playing, growing], () => [
-    el("ul", { class: "entries" }, ...recordings.map((recording) => row(recording, playing, growing))),
-    el("p", { class: "muted" }, `Files in ${folder}`),
-  ]);
+let learning = false;
+
+/** Asks what each recording holds, one after the other: the server reads them for that. */
+async function learn(recordings) {
+  if (learning) return;
+  learning = true;
+  for (const recording of recordings) {
+    const key = keyOf(recording);
+    if (get("panel") !== "sources" || key in get("recordingFacts") || isGrowing(recording)) continue;
+    const facts = await request("GET", `${pathOf(recording.name)}/facts`).catch(() => null);
+    set("recordingFacts", { ...get("recordingFacts"), [key]: facts });
+  }
+  learning = false;
 }
+
+const pathOf = (name) => `recordings/${encodeURIComponent(name)}`;
+const keyOf = ({ name, size, modified }) => [name, size, modified].join("/");
 
 /** A raw capture beside a recording has its name but for the ending. */
 const stem = (name) => name.replace(/\.[^.]*$/, "");
 
-function row({ name, size, builtin = false }, playing, growing) {
-  if (stem(name) === growing) return el("li", {}, entryText(name, "is being recorded"));
-  const current = name === playing;
-  const about = builtin ? `demo, ${bytes(size)}` : bytes(size);
+const isGrowing = ({ name }) => {
+  const recorder = get("recorder");
+  return recorder?.state === "recording" && stem(recorder.name) === stem(name);
+};
+
+function drawLibrary({ folder, recordings }, source, recorder, known, renaming) {
+  const playing = source.recording;
+  const growing = recorder.state === "recording" ? recorder.name : null;
+  remake($("library-list"), [folder, recordings, playing, growing, known, renaming], () => [
+    el("ul", { class: "entries" }, ...recordings.map((recording) => row(recording, playing, renaming))),
+    el("p", { class: "muted" }, `Files in ${folder}`),
+  ]);
+}
+
+function row(recording, playing, renaming) {
+  const { name, builtin = false } = recording;
+  if (isGrowing(recording)) return el("li", {}, entryText(name, "is being recorded"));
+  if (name === renaming) return el("li", {}, renameForm(name));
+  const isPlaying = name === playing;
   const button = el(
     "button",
     { type: "button", class: "entry", "data-key": name, onclick: () => open({ kind: "recording", name }) },
-    ...entryText(name, about).childNodes,
+    ...entryText(name, extentOf(recording)).childNodes,
   );
-  if (current) button.setAttribute("aria-current", "true");
-  return el("li", {}, button, ...(builtin ? [] : [deleteButton(name, current)]));
+  if (isPlaying) button.setAttribute("aria-current", "true");
+  const about = el("p", { class: "about muted" }, aboutOf(recording));
+  return el("li", {}, button, downloadLink(name), ...(builtin ? [] : changeButtons(name, isPlaying)), about);
 }
 
 const entryText = (name, about) => el("p", { class: "entry" }, el("span", {}, name), el("small", {}, about));
 
-function deleteButton(name, disabled) {
-  const button = iconButton("delete", `Delete ${name}`, () => confirmDelete(name));
-  button.disabled = disabled;
-  return button;
+/** How long and how large. */
+function extentOf(recording) {
+  const facts = get("recordingFacts")[keyOf(recording)];
+  const parts = [facts?.duration != null && duration(facts.duration), bytes(recording.size)];
+  return parts.filter(Boolean).join(", ");
 }
 
-function confirmDelete(name) {
-  const remove = async () => {
-    const path = `recordings/${encodeURIComponent(name)}`;
-    await attempt(() => request("DELETE", path), "The recording was not deleted");
+/** What took it, as far as that is known. */
+function aboutOf(recording) {
+  const facts = get("recordingFacts")[keyOf(recording)];
+  const parts = [recording.builtin && "demo", facts?.format, facts?.topics.join(", "), facts?.problem];
+  return parts.filter(Boolean).join(" · ");
+}
+
+const downloadLink = (name) =>
+  el(
+    "a",
+    {
+      class: "button icon",
+      href: address(pathOf(name)).href,
+      download: name,
+      "aria-label": `Download ${name}`,
+      title: `Download ${name}`,
+    },
+    icon("download"),
+  );
+
+function changeButtons(name, isPlaying) {
+  const rename = iconButton("rename", `Rename ${name}`, () => set("renaming", name));
+  const remove = iconButton("delete", `Delete ${name}`, () => removeRecording(name));
+  remove.disabled = isPlaying;
+  return [rename, remove];
+}
+
+function renameForm(name) {
+  const input = el("input", { type: "text", value: name, required: true, "aria-label": `New name of ${name}`, "data-key": name });
+  const submit = async (event) => {
+    event.preventDefault();
+    const change = { name: input.value.trim() };
+    const done = await attempt(() => request("PATCH", pathOf(name), change), "The recording was not renamed");
+    if (done) await refreshRecordings();
+    set("renaming", null);
+  };
+  const cancel = ({ key }) => key === "Escape" && set("renaming", null);
+  const form = el(
+    "form",
+    { class: "fields", onsubmit: submit, onkeydown: cancel },
+    input,
+    el("button", { type: "submit", class: "button" }, "Rename"),
+  );
+  requestAnimationFrame(() => {
+    input.focus();
+    input.setSelectionRange(0, stem(name).length);
+  });
+  return form;
+}
+
+async function removeRecording(name) {
+  const isGone = await attempt(async () => {
+    await request("DELETE", pathOf(name));
+    return true;
+  }, "The recording was not deleted");
+  await refreshRecordings();
+  if (!isGone) return;
+  const restore = async () => {
+    await attempt(() => request("POST", `${pathOf(name)}/restore`), "The recording could not be taken back");
     await refreshRecordings();
   };
-  toast(`${name} will be deleted from the server.`, {
-    title: "Delete this recording?",
-    action: { label: "Delete", run: remove },
-    linger: QUESTION_MS,
+  toast(name, {
+    title: "The recording is deleted",
+    action: { label: "Undo", run: restore },
+    linger: 1e3 * get("recordings").undo_within,
   });
 }

@@ -1,8 +1,9 @@
 // "Why is my wall missing?": what was rejected in the current frame, by reason.
 
 import { $, el, setText } from "./dom.js";
-import { paced } from "./pace.js";
-import { on } from "./store.js";
+import { throttled } from "./throttle.js";
+import { placer } from "./overlay/world.js";
+import { get, on, set } from "./store.js";
 import { fixed } from "./units.js";
 
 const REFRESH_MS = 1000; // slower than the frames: these are sentences to read
@@ -10,7 +11,8 @@ const MOST = 60;
 
 export function mountRejections() {
   on(["frame"], ({ rejections }) => setText($("rejection-count"), rejections.length));
-  const list = paced(REFRESH_MS, draw);
+  const list = throttled(REFRESH_MS, draw);
+  on(["panel"], (panel) => panel !== "rejections" && set("place", null));
   on(["frame", "panel"], (frame, panel) => panel === "rejections" && list(frame));
 }
 
@@ -33,9 +35,10 @@ function group(title, items) {
   return el("section", {}, heading, el("ul", { class: "reasons" }, ...items.map(entry)));
 }
 
+/** A click on it shows where that was. */
 function entry({ message, xy }) {
-  const where = xy?.every(Number.isFinite)
-    ? ` at\u00a0(${fixed(xy[0], 2)},\u00a0${fixed(xy[1], 2)})\u00a0m`
-    : "";
-  return el("li", {}, message, el("small", {}, where));
+  if (!xy?.every(Number.isFinite)) return el("li", {}, message);
+  const where = ` at\u00a0(${fixed(xy[0], 2)},\u00a0${fixed(xy[1], 2)})\u00a0m`;
+  const onclick = () => set("place", placer(get("frame").localization?.pose)(xy));
+  return el("li", {}, el("button", { type: "button", class: "where", title: "Show the place", onclick }, message, el("small", {}, where)));
 }

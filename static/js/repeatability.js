@@ -3,35 +3,37 @@
 import { request } from "./api.js";
 import { switchRow } from "./bindings.js";
 import { boxPlot, drawBoxes } from "./boxes.js";
-import { calibrateHint, claimTable, drawClaims } from "./claims.js";
+import { calibrateHint, claimTable, drawClaims, drawTable } from "./claims.js";
 import { $, el, setText, swatch } from "./dom.js";
-import { paced } from "./pace.js";
+import { throttled } from "./throttle.js";
 import { parameterRow } from "./parameters.js";
-import { cornersOf, cornerToShow, drawList, drawScatter, followSelection, pick, scatterPlot } from "./scatter.js";
-import { attempt } from "./session.js";
+import { cornersOf, cornerToShow, drawList, drawScatter, followSelection, pick, scatterPlot, sightedWall } from "./scatter.js";
+import { selectedWall } from "./selected-wall.js";
+import { attempt } from "./actions.js";
 import { get, on, set } from "./store.js";
 
 const REFRESH_MS = 1000;
 
 const ABOUT =
-  "Let the sensor stand still. Each corner is then found elsewhere in every scan, a little: this scatter is what its ellipse should tell. Here it is held against what each method claims.";
+  "Keep the sensor still. Each corner and wall is then found at a slightly different place in every scan, and its ellipse should be as large as this scatter. Here the scatter is compared with what each method claims.";
 
 let before = ""; // what the page last asked for, besides new scans
 let followed = null; // the corner selected last
 
 export function mountRepeatability() {
   on(["fields"], make);
-  const refresh = paced(REFRESH_MS, ask);
-  on(["frame", "panel", "settings", "fields"], (frame, panel, { repeatability }) => {
-    const now = JSON.stringify([panel, repeatability]);
-    if (panel === "repeatability" && (repeatability.running || now !== before)) refresh();
+  const refresh = throttled(REFRESH_MS, ask);
+  on(["frame", "panel", "settings", "fields", "selection", "wall"], (frame, panel, { repeatability, view }, _, { corner }, wall) => {
+    const now = JSON.stringify([panel, repeatability, view.compare, corner, Boolean(wall)]);
+    const isShown = panel === "repeatability" || view.compare || corner !== null || wall;
+    if (isShown && (repeatability.running || now !== before)) refresh();
     before = now;
   });
   on(["selection", "panel"], ({ corner }, panel) => {
     if (corner === followed) return; // the server tells of it again and again
     followed = corner;
     followSelection();
-    if (panel === "repeatability") showCorner();
+    if (panel === "repeatability" || corner !== null) showCorner();
   });
   on(["methods", "fields"], (methods) =>
     $("repeatability-methods").replaceChildren(...methods.map(({ name }) => el("li", {}, swatch(name), name))),
@@ -49,11 +51,11 @@ function make(fields) {
       { "aria-labelledby": "repeatability-title" },
       title("repeatability-title", "Repeatability"),
       el("p", { class: "muted about" }, ABOUT),
-      switchRow("Watch the scatter", "repeatability.running"),
+      switchRow("Compare with the scatter", "repeatability.running"),
       parameterRow({ ...window, unit: "scans" }),
       progress(),
       el("p", { id: "repeatability-message", class: "notice", hidden: true }),
-      el("div", { class: "buttons" }, beginAnew(), download()),
+      el("div", { class: "buttons" }, startOver(), download()),
     ),
     el(
       "section",
@@ -66,11 +68,19 @@ function make(fields) {
     el(
       "section",
       { id: "repeatability-claims", "aria-labelledby": "claims-title", hidden: true },
-      title("claims-title", "Claim and scatter"),
+      title("claims-title", "Corners: claim and scatter"),
       calibrateHint(),
       el("p", { id: "repeatability-verdict" }),
       el("div", { class: "table-scroll", tabIndex: -1 }, claimTable()),
       el("p", { class: "muted" }, "First the sum of the areas, where large ellipses of far corners weigh most; then how much of the scatter, in %, the ellipses of 50, 95 and 99 % hold. Below each its 95 % confidence interval."),
+    ),
+    el(
+      "section",
+      { id: "repeatability-walls", "aria-labelledby": "walls-title", hidden: true },
+      title("walls-title", "Walls: claim and scatter"),
+      el("p", { id: "repeatability-walls-verdict" }),
+      el("div", { class: "table-scroll", tabIndex: -1 }, claimTable("repeatability-walls-table")),
+      el("p", { class: "muted" }, "The same of a wall's direction and distance. Many rooms show no corner, but all show walls; where a wall ends changes from scan to scan, and that is part of its scatter."),
     ),
     el(
       "section",
@@ -94,17 +104,17 @@ function progress() {
   );
 }
 
-function beginAnew() {
+function startOver() {
   const clear = async () => {
     await request("DELETE", "repeatability");
     await ask();
   };
-  const onclick = () => attempt(clear, "The window was not begun anew");
-  return el("button", { type: "button", id: "begin-anew", title: "Forget the scans of the window", onclick }, "Begin anew");
+  const onclick = () => attempt(clear, "The window could not be cleared");
+  return el("button", { type: "button", id: "start-over", title: "Forget the scans of the window", onclick }, "Start over");
 }
 
 const download = () =>
-  el("a", { class: "button quiet", href: "api/v1/repeatability?format=csv", download: "repeatability.csv" }, "CSV");
+  el("a", { class: "button quiet", href: "api/v1/repeatability?format=csv", download: "repeatability.csv", "aria-label": "CSV of the repeatability" }, "CSV");
 
 function cornerRow() {
   const list = el("select", { id: "repeatability-corner" });
@@ -128,18 +138,27 @@ async function ask() {
   const found = await request("GET", "repeatability").catch(() => null);
   if (!found) return;
   set("repeatability", found);
-  await showCorner(found);
+  await Promise.all([showCorner(found), showWall(found)]);
+}
+
+async function showWall(found) {
+  const wall = selectedWall(get("frame"));
+  const sighted = wall && sightedWall(found, wall, get("frame"));
+  if (sighted) await showDots("wallDeviations", `walls/${sighted.id}`);
 }
 
 async function showCorner(found = get("repeatability")) {
   const corner = found && cornerToShow(cornersOf(found));
-  if (!corner) return;
-  const dots = await request("GET", `repeatability/corners/${corner.id}`).catch(() => null); // it may be gone by now
-  if (dots) set("deviations", dots);
+  if (corner) await showDots("deviations", `corners/${corner.id}`);
+}
+
+async function showDots(key, path) {
+  const dots = await request("GET", `repeatability/${path}`).catch(() => null); // it may be gone by now
+  if (dots) set(key, dots);
 }
 
 function draw(found, { extraction, repeatability }) {
-  const { scans, window, message, methods } = found;
+  const { scans, window, message, methods, walls } = found;
   const corners = cornersOf(found);
   const [bar, text] = $("repeatability-progress").children;
   bar.value = scans / window;
@@ -147,10 +166,12 @@ function draw(found, { extraction, repeatability }) {
   $("repeatability-progress").hidden = !scans && !repeatability.running;
   setText($("repeatability-message"), message ?? "");
   $("repeatability-message").hidden = !message || !(scans || repeatability.running);
-  $("begin-anew").disabled = !scans;
+  $("start-over").disabled = !scans;
   drawBoxes(methods);
   $("repeatability-claims").hidden = $("repeatability-scatter").hidden = !corners.length;
   drawClaims(methods, extraction);
+  $("repeatability-walls").hidden = !walls.methods.some((method) => method.walls.length);
+  drawTable(walls.methods, extraction, "repeatability-walls-table", "repeatability-walls-verdict");
 }
 
 /** The dots are those of the method in use. */

@@ -5,7 +5,7 @@ const SAME_S = 0.5; // between the beginnings of one source as two of its frames
 let before = null;
 
 /** Notes a frame; returns whether what was seen so far says nothing of it. */
-export function beginsAnew({ stamp, source, localization }) {
+export function isNewRun({ stamp, source, localization }) {
   const now = { kind: source.kind, start: stamp - source.time, session: localization?.session ?? null };
   const was = before ?? now;
   before = now;

@@ -2,7 +2,8 @@
 
 import { KINDS } from "./boxes.js";
 import { $, el, remake, setText } from "./dom.js";
-import { select } from "./session.js";
+import { axesOf } from "./overlay/ellipses.js";
+import { select } from "./actions.js";
 import { get } from "./store.js";
 import { drawing, roundStep, shape } from "./svg.js";
 import { fixed, metres } from "./units.js";
@@ -15,9 +16,13 @@ const SIGMAS = Math.sqrt(-2 * Math.log(1 - 0.95)); // of an ellipse that holds 9
 const MOST = 0.98; // of the dots that the scale is made for
 const MARGIN = 1.1;
 const SAME_M = 0.3; // between a corner of the frame and one of the window
+const ALIGNED = 0.94; // cosine of the turn between a wall of the frame and one of the window
 const MM = 1e3;
 
-const svg = drawing(SIZE, SIZE, "scatter");
+/** An empty drawing for `plotScatter`. */
+export const scatterDrawing = () => drawing(SIZE, SIZE, "scatter");
+
+const svg = scatterDrawing();
 let picked = null; // in the list; else it is the selected corner, or the first
 
 export const scatterPlot = () => svg;
@@ -26,13 +31,15 @@ export const scatterPlot = () => svg;
 export const followSelection = () => (picked = null);
 
 /** The corners of a summary by their id: {id, mean, methods: {name: what that method says}}. */
-export function cornersOf({ methods }) {
+export const cornersOf = ({ methods }) => byId(methods, ({ corners }) => corners);
+
+function byId(methods, thingsOf) {
   const found = new Map();
-  for (const { name, corners } of methods) {
-    for (const corner of corners) {
-      const { id, mean } = corner;
+  for (const method of methods) {
+    for (const thing of thingsOf(method)) {
+      const { id, mean } = thing;
       if (!found.has(id)) found.set(id, { id, mean, methods: {} });
-      found.get(id).methods[name] = corner;
+      found.get(id).methods[method.name] = thing;
     }
   }
   return [...found.values()].sort((a, b) => a.id - b.id);
@@ -49,7 +56,7 @@ export function drawList(corners, shown) {
   const seen = seenNow();
   const entries = corners.map(({ id, mean }) => {
     const name = nearest(seen, mean);
-    return { id, name: name ? `C${name.id}` : "Not in sight", where: mean.map(metres).join(", ") };
+    return { id, name: name ? `C${name.id}` : "Not in view", where: mean.map(metres).join(", ") };
   });
   remake($("repeatability-corner"), [entries, shown?.id], () =>
     entries.map(({ id, name, where }) =>
@@ -74,6 +81,24 @@ function seenNow() {
   });
 }
 
+/** The corner of a summary that a corner of the frame at a place is, if it is one. */
+export const sightedAt = (found, place) => nearest(cornersOf(found), place);
+
+/** The wall of a summary that a wall of a frame, by its main method, is, if it is one. */
+export function sightedWall({ walls }, wall, { covariance: kind, methods: [main] }) {
+  const alike = byId(walls.methods, (method) => method.walls)
+    .filter(({ methods, mean: [alpha] }) => methods[main] && Math.cos(alpha - wall.alpha) > ALIGNED)
+    .map((found) => ({ ...found, xy: surestPlace(found.methods[main].mean, found.methods[main].claims[kind].covariance) }));
+  return nearest(alike, surestPlace([wall.alpha, wall.r], wall.covariance));
+}
+
+/** Where a line is known best across itself: near the middle of its points, which tells walls of one line apart. */
+function surestPlace([alpha, r], [[alphas, mixed]]) {
+  const [c, s] = [Math.cos(alpha), Math.sin(alpha)];
+  const along = mixed / alphas;
+  return [r * c - along * s, r * s + along * c];
+}
+
 /** The one of some corners, {xy} or {mean}, that is close to a place, if one is. */
 function nearest(corners, [x, y]) {
   const distance = ({ xy, mean }) => Math.hypot((xy ?? mean)[0] - x, (xy ?? mean)[1] - y);
@@ -83,42 +108,53 @@ function nearest(corners, [x, y]) {
 
 /** Draws a corner with the dots of one method, m from their mean. */
 export function drawScatter({ methods }, dots, dotted) {
-  const ellipses = Object.entries(methods).flatMap(([method, { claims }]) =>
-    KINDS.map((kind) => ({ method, kind, ...axesOf(claims[kind].covariance) })),
-  );
-  const ways = dots.map(([x, y]) => Math.hypot(x, y)).sort((a, b) => a - b);
-  const reach = MARGIN * Math.max(...ellipses.map(({ long }) => long), ways[Math.floor(MOST * (ways.length - 1))] ?? 0);
-  const scale = HALF / reach; // px/m
-  const inside = dots.filter((dot) => Math.max(...dot.map(Math.abs)) <= reach);
+  const beyond = plotScatter(svg, claimsOf(methods), dots);
   svg.setAttribute("aria-label", described(methods, dotted));
-  svg.replaceChildren(
-    ...grid(reach, scale),
-    ...inside.map(([x, y]) => shape("circle", { class: "dot", cx: CENTRE + scale * x, cy: CENTRE - scale * y, r: 2 })),
-    ...ellipses.map((ellipse) => outline(ellipse, scale)),
-  );
-  const beyond = dots.length - inside.length;
   setText(
     $("repeatability-dots"),
     `${dots.length} dots, by ${dotted}${beyond ? `, ${beyond} of them farther out` : ""}. x to the right, y up, mm from the mean.`,
   );
 }
 
-/** Half axes (m) and direction (degrees, clockwise as drawn) of the ellipse that should hold 95 %. */
-function axesOf([[xx, xy], [, yy]]) {
-  const mean = (xx + yy) / 2;
-  const apart = Math.hypot((xx - yy) / 2, xy);
-  const [long, short] = [mean + apart, mean - apart].map((value) => SIGMAS * Math.sqrt(Math.max(value, 0)));
-  return { long, short, turn: (-90 / Math.PI) * Math.atan2(2 * xy, xx - yy) };
+/** What each method claims of a corner of a summary, by both kinds of covariance. */
+export const claimsOf = (methods) =>
+  Object.entries(methods).flatMap(([method, { claims }]) =>
+    KINDS.map((kind) => ({ method, kind, covariance: claims[kind].covariance })),
+  );
+
+/**
+ * Draws the 95 % ellipses of claims {method, kind, covariance, offset [x, y] m} and dots, to one scale that holds most
+ * of them, with mm at its lines. Returns how many dots lie beyond.
+ */
+export function plotScatter(svg, claims, dots) {
+  const ellipses = claims.map((claim) => ({ offset: [0, 0], ...claim, ...scaledAxes(claim.covariance) }));
+  const ways = dots.map(([x, y]) => Math.hypot(x, y)).sort((a, b) => a - b);
+  const reaches = ellipses.map(({ long, offset }) => long + Math.hypot(...offset));
+  const reach = MARGIN * Math.max(...reaches, ways[Math.floor(MOST * (ways.length - 1))] ?? 0);
+  const scale = HALF / reach; // px/m
+  const inside = dots.filter((dot) => Math.max(...dot.map(Math.abs)) <= reach);
+  svg.replaceChildren(
+    ...grid(reach, scale),
+    ...inside.map(([x, y]) => shape("circle", { class: "dot", cx: CENTRE + scale * x, cy: CENTRE - scale * y, r: 2 })),
+    ...ellipses.map((ellipse) => outline(ellipse, scale)),
+  );
+  return dots.length - inside.length;
 }
 
-const outline = ({ method, kind, long, short, turn }, scale) =>
+/** Half axes (m) and direction (degrees, clockwise as drawn) of the ellipse that should hold 95 %. */
+function scaledAxes(covariance) {
+  const { long, short, direction } = axesOf(covariance);
+  return { long: SIGMAS * long, short: SIGMAS * short, turn: (-180 / Math.PI) * direction };
+}
+
+const outline = ({ method, kind, offset: [x, y], long, short, turn }, scale) =>
   shape("ellipse", {
     method,
     class: `claim ${kind}`,
     "data-method": method,
     rx: scale * long,
     ry: scale * short,
-    transform: `translate(${CENTRE} ${CENTRE}) rotate(${turn})`,
+    transform: `translate(${CENTRE + scale * x} ${CENTRE - scale * y}) rotate(${turn})`,
   });
 
 /** Lines at round millimetres. */

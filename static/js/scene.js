@@ -1,11 +1,24 @@
-// The scene's frame: its keys reach the page's shortcuts, its tools are the page's buttons.
+// The scene's frame: its keys reach the page's shortcuts, its tools are the page's buttons. What is drawn over it lies as
+// its camera looks, or, while it has none, as a plain one does.
 
 import { $ } from "./dom.js";
-import { setting, toggleSetting } from "./session.js";
-import { on } from "./store.js";
+import { setting, toggleSetting } from "./actions.js";
+import { Look, PlainCamera } from "./overlay/look.js";
+import { get, on } from "./store.js";
 
 /** What the scene's frame offers, once it has started. */
 export const view = () => $("scene").contentWindow?.lidarView;
+
+const plain = new PlainCamera($("stage"));
+
+/** How the floor is seen now. */
+export function lookNow() {
+  const { clientWidth, clientHeight } = $("stage");
+  return new Look(view()?.floorToWindow() ?? plain.floorToWindow(), clientWidth, clientHeight);
+}
+
+/** The camera that the pointer moves over a scene that has none; else null. */
+export const plainCamera = () => (view()?.floorToWindow() ? null : plain);
 
 const handlers = new Map(); // by the type of the message
 
@@ -15,22 +28,61 @@ export const onSceneMessage = (type, run) => handlers.set(type, run);
 /** `press(event)` receives the keys pressed in the scene. */
 export function mountScene(press) {
   onSceneMessage("keydown", press);
-  $("fit").addEventListener("click", fitScene);
+  $("fit").addEventListener("click", () => fitScene());
   $("rotate").addEventListener("click", () => toggleSetting("view.rotate"));
-  $("scene").addEventListener("load", applyRotation);
-  on(["settings"], applyRotation);
-  on(["frame"], () => $("stage").classList.remove("waiting"));
+  $("scene").addEventListener("load", () => {
+    applyRotation();
+    hideLayers();
+    if (get("frame")) follow(get("frame"));
+  });
+  on(["settings"], () => {
+    applyRotation();
+    hideLayers();
+  });
+  on(["frame"], (frame) => {
+    $("stage").classList.remove("waiting");
+    follow(frame);
+  });
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
     if (ours) handlers.get(data?.type)?.(data);
   });
 }
 
-export const fitScene = () => view()?.fit();
+function follow({ extent }) {
+  plain.follow(extent);
+  view()?.follow(extent);
+}
+
+/** Fits the room of a frame, else of the newest one, in the view. */
+export function fitScene(frame = get("frame")) {
+  plain.fit(frame?.extent);
+  view()?.fit(frame?.extent);
+}
 
 function applyRotation() {
   const wanted = setting("view.rotate");
   if (wanted === undefined) return;
   $("rotate").setAttribute("aria-pressed", String(wanted));
   view()?.setRotate(wanted);
+}
+
+/** Nodes of the scene by the layers that someone may hide here only. */
+const NODES = {
+  points: "/body/points",
+  segments: "/body/segments",
+  rejected: "/body/rejected",
+  gaps: "/body/gaps",
+  clusters: "/body/clusters",
+  trail: "/trails/estimated",
+  dead_reckoned: "/trails/reckoned",
+  truth: "/trails/true",
+  occupancy: "/occupancy",
+  walls: "/walls",
+  associations: "/associations",
+};
+
+function hideLayers() {
+  const layers = setting("view.layers");
+  if (layers) view()?.hide(Object.keys(NODES).filter((layer) => !layers[layer]).map((layer) => NODES[layer]));
 }

@@ -5,6 +5,7 @@ import { $, el } from "./dom.js";
 import { nextLandmark } from "./landmarks.js";
 import { toggleMethod } from "./method.js";
 import { nextMode } from "./navigation.js";
+import { cancelMeasure, toggleMeasure } from "./overlay/measure.js";
 import { cancelPlacing, togglePlacing } from "./placing.js";
 import { toggleRecording } from "./recorder.js";
 import { fitScene } from "./scene.js";
@@ -16,7 +17,7 @@ import {
   togglePlaying,
   toggleSetting,
   transport,
-} from "./session.js";
+} from "./actions.js";
 import { get } from "./store.js";
 import { toggleTheme } from "./theme.js";
 
@@ -63,10 +64,11 @@ const SHORTCUTS = [
     about: "Previous, next corner; landmark while the map is open",
     run: (key) => (get("panel") === "map" ? nextLandmark : nextCorner)(key === "ArrowUp" ? -1 : 1),
   },
-  { keys: ["Escape"], about: "Select nothing, set no pose", run: () => cancelPlacing() || selectNothing() },
+  { keys: ["Escape"], about: "Clear the selection, or stop measuring or setting the pose", run: () => cancelPlacing() || cancelMeasure() || selectNothing() },
   { keys: ["m"], about: "Off, SLAM, localize", run: nextMode },
   { keys: ["i"], about: "Set the pose by dragging", run: togglePlacing },
-  { keys: ["f"], about: "Fit the room in the view", run: fitScene },
+  { keys: ["d"], about: "Measure a distance", run: toggleMeasure },
+  { keys: ["f"], about: "Fit the room in the view", run: () => fitScene() },
   { keys: ["r"], about: "Rotate freely", run: () => toggleSetting("view.rotate") },
   { keys: ["t"], about: "Light or dark", run: toggleTheme },
   { keys: ["?"], about: "This help", run: showHelp },
@@ -75,6 +77,9 @@ const SHORTCUTS = [
 export function mountShortcuts() {
   document.addEventListener("keydown", (event) => {
     if (!event.defaultPrevented && !keptBy(event.target, event.key) && press(event)) event.preventDefault();
+  });
+  document.addEventListener("keyup", (event) => {
+    if (event.key === " " && !keptBy(event.target, " ") && !inDialog()) event.preventDefault(); // no click on top
   });
   $("help").addEventListener("click", showHelp);
 }
@@ -88,7 +93,7 @@ export function press({
   metaKey = false,
   altKey = false,
 }) {
-  const busy = document.querySelector("dialog[open]") || !get("source");
+  const busy = inDialog() || !get("source");
   if (ctrlKey || metaKey || altKey || busy) return false;
   const digit = /^(?:Digit|Numpad)([1-6])$/.exec(code)?.[1] ?? (/^[1-6]$/.test(key) ? key : null);
   if (digit) return shiftKey ? compareWith(digit) : chooseFitter(digit);
@@ -98,11 +103,13 @@ export function press({
   return Boolean(found);
 }
 
-/** Whether the focused control uses the key itself. */
+const inDialog = () => document.querySelector("dialog[open]");
+
+/** Whether the focused control uses the key itself. Space plays and pauses; Enter is there to press buttons. */
 function keptBy(target, key) {
   if (target.matches('select, textarea, input:not([type="checkbox"], [type="range"])')) return true;
   if (target.matches('input[type="range"]')) return key.startsWith("Arrow") || key === "Home";
-  return key === " " && target.matches("button, a, summary, input, label");
+  return key === " " && target.matches("input:focus-visible");
 }
 
 const fitterOf = (digit) => get("methods")?.[Number(digit) - 1]?.name;

@@ -6,7 +6,7 @@ import { $, el, remake, setText } from "./dom.js";
 import { merge } from "./optimistic.js";
 import { parameterRow } from "./parameters.js";
 import { fieldsOf } from "./schema.js";
-import { attempt, open } from "./session.js";
+import { attempt, open } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { capital } from "./units.js";
 
@@ -16,16 +16,16 @@ const GROUPS = [
     title: "Sensor",
     holds: (path) => /\.(field_of_view|max_range|noise\.sigma_\w+|mixed|dropouts)$/.test(path),
   },
-  { title: "Error of the odometry", holds: (path) => path.includes(".odometry.") },
-  { title: "Around it", holds: () => true },
+  { title: "Odometry errors", holds: (path) => path.includes(".odometry.") },
+  { title: "Surroundings", holds: () => true },
 ];
 
 const LABELS = {
   sigma_range: "Range noise",
   sigma_bearing: "Bearing noise",
   mixed: "Mixed beams",
-  scale: "Way too long",
-  track: "Turn too large",
+  scale: "Distance error",
+  track: "Rotation error",
 };
 
 const at = (object, path) => path.split(".").reduce((node, key) => node?.[key], object);
@@ -49,7 +49,7 @@ export function mountSimulation() {
   on(["simulation", "drafts"], offerPaths);
   paths.addEventListener("change", () => draft.change(PATH, paths.value));
   on(["source", "opening"], ({ kind }, opening) => {
-    setText($("simulate"), kind === ROOT ? "Start anew" : "Start");
+    setText($("simulate"), kind === ROOT ? "Restart" : "Start");
     $("simulate").setAttribute("aria-busy", String(opening?.kind === ROOT));
   });
   $("simulation").append(

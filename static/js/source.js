@@ -3,7 +3,7 @@
 import { $, el, remake, setText } from "./dom.js";
 import { KINDS, nameOf, stateOf, stateText } from "./live.js";
 import { refreshRecordings } from "./recordings.js";
-import { open } from "./session.js";
+import { open } from "./actions.js";
 import { simulate } from "./simulation.js";
 import { get, on } from "./store.js";
 import { toast } from "./toasts.js";
@@ -16,10 +16,10 @@ const OPENING = {
 };
 
 const ENDED = {
-  device: "The device has gone",
+  device: "The device was disconnected",
   emulator: "The emulator has ended",
   simulation: "The simulation has ended",
-  recording: "The recording cannot be read on",
+  recording: "The recording could not be read to its end",
 };
 
 let lastRecording = null;

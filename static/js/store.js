@@ -1,8 +1,10 @@
-// What the page knows, by key: connection, settings, source, selection, ready, frame, methods, fields.
-// Rooms read it and are told of changes once per animation frame, so a hidden page does no work.
+// What the page knows, by key: what the server streams (settings, source, selection, localization, recorder, ready,
+// frame), what was asked for (methods, clusterers, fields, simulation, repeatability, ...) and what the page itself is
+// doing (connection, opening, panel, ...). Modules read it and are called after changes, once per animation frame, so a
+// hidden page does no work.
 
 const values = {};
-const listeners = [];
+const listeners = new Set();
 const changed = new Set();
 
 export const get = (key) => values[key];
@@ -13,10 +15,15 @@ export function set(key, value) {
   changed.add(key);
 }
 
-/** Calls `render` with the values of all keys, in their order, as soon as all are known and after each change. */
+/**
+ * Calls `render` with the values of all keys, in their order, as soon as all are known and after each change; until the
+ * function that is returned is called.
+ */
 export function on(keys, render) {
-  listeners.push({ keys, render });
+  const listener = { keys, render };
+  listeners.add(listener);
   if (known(keys)) render(...keys.map(get));
+  return () => listeners.delete(listener);
 }
 
 const known = (keys) => keys.every((key) => values[key] !== undefined);
@@ -29,7 +36,7 @@ function flush() {
     try {
       render(...keys.map(get));
     } catch (error) {
-      console.error(error); // one room's fault does not darken the others
+      console.error(error); // one module's fault does not stop the others
     }
   }
 }

@@ -3,6 +3,8 @@
 import { $ } from "./dom.js";
 import { set } from "./store.js";
 
+const KEY = "panel"; // what a reload brings back
+
 const wide = matchMedia("(min-width: 900px)");
 const tabs = () =>
   [...document.querySelectorAll('[role="tab"]')].filter((tab) => !(wide.matches && tab.id === "tab-corners"));
@@ -13,7 +15,9 @@ export function mountTabs() {
   }
   document.querySelector('[role="tablist"]').addEventListener("keydown", walk);
   wide.addEventListener("change", arrange);
-  arrange();
+  const before = tabs().find((tab) => tab.getAttribute("aria-controls") === sessionStorage.getItem(KEY));
+  if (before) showPanel(before.getAttribute("aria-controls"));
+  else arrange();
 }
 
 /** Shows one panel by its id; `focus` moves the focus to its tab. */
@@ -25,6 +29,7 @@ export function showPanel(id, { focus = false } = {}) {
     tab.tabIndex = chosen ? 0 : -1;
     if (chosen && focus) tab.focus();
   }
+  sessionStorage.setItem(KEY, id);
   set("panel", id);
 }
 

@@ -1,22 +1,33 @@
-// Light or dark. The scene's theme is the server's and shared, so the page follows the settings; the first
-// browser to arrive brings its preference along, and a server that has started anew is told what is shown.
+// Light or dark, as each browser has it. The points and walls of the scene are drawn once for all: in the theme of the
+// only browser there is; where several differ, those that want the other one turn its colours over.
 
 import { request } from "./api.js";
 import { $ } from "./dom.js";
-import { attempt, changeSetting, setting } from "./session.js";
+import { attempt, changeSetting, setting, settings } from "./actions.js";
+import { ownChoices } from "./own.js";
 import { on } from "./store.js";
 
 const prefersLight = matchMedia("(prefers-color-scheme: light)");
 
 export function mountTheme() {
-  on(["settings"], ({ view }) => (document.documentElement.dataset.theme = view.theme));
+  on(["settings"], ({ view }) => {
+    document.documentElement.dataset.theme = view.theme;
+    $("scene").classList.toggle("turned", ownChoices().includes("theme"));
+  });
   $("theme").addEventListener("click", toggleTheme);
 }
 
 export function toggleTheme() {
   const theme = setting("view.theme") === "dark" ? "light" : "dark";
   localStorage.setItem("theme", theme);
-  changeSetting("view.theme", theme);
+  wear(theme);
+}
+
+/** Shows a theme here, and has the scene drawn in it if nobody else is looking. */
+async function wear(theme) {
+  await changeSetting("view.theme", theme);
+  const health = await attempt(() => request("GET", "health"));
+  if (health && health.clients <= 1) await settings.share({ view: { theme } });
 }
 
 let born = null; // Unix seconds when the server started
@@ -29,13 +40,11 @@ export async function keepTheme() {
   const started = Date.now() / 1000 - health.uptime_s;
   const isAnother = born !== null && started - born > 1;
   born = started;
-  if (isAnother) await changeSetting("view.theme", shown);
+  if (isAnother) await wear(shown);
 }
 
-/** Sets the theme this browser was left with or prefers, unless others are watching already. */
+/** Sets the theme this browser was left with or prefers. */
 export async function bringPreference() {
   const preferred = localStorage.getItem("theme") ?? (prefersLight.matches ? "light" : "dark");
-  if (preferred === setting("view.theme")) return;
-  const health = await attempt(() => request("GET", "health"));
-  if (health && health.clients <= 1) await changeSetting("view.theme", preferred);
+  if (preferred !== setting("view.theme")) await wear(preferred);
 }

@@ -4,7 +4,7 @@
 import { $, el, iconButton, setIcon, setText } from "./dom.js";
 import { isStale, stateOf } from "./live.js";
 import { recorderControls } from "./recorder.js";
-import { isPlaying, step, togglePlaying, transport } from "./session.js";
+import { isPlaying, step, togglePlaying, transport } from "./actions.js";
 import { on } from "./store.js";
 import { clock, wholeNumber } from "./units.js";
 

@@ -37,7 +37,7 @@ function removeLater(node, wait) {
 }
 
 /** Shows what went wrong, in the words of the server where it has some. */
-export function report(error, title = "That did not work", about = "") {
+export function report(error, title = "Something went wrong", about = "") {
   if (!(error instanceof Error)) throw error;
   console.warn(error.message);
   if (error.status === 0) toast(error.message, { title: error.title, kind: "error", about: "connection" });

@@ -2,7 +2,7 @@
 
 export const UNKNOWN = "\u2013";
 export const COMPLETE_HINT =
-  "Share of the turn whose measurements arrived, whether or not they have a return";
+  "Share of the revolution whose measurements arrived, with or without a return";
 
 const FIRST_YEAR = 1990; // with lidar logs
 const DEGREE = Math.PI / 180;
@@ -13,6 +13,7 @@ export function displayOf({ unit, default: preset, integer }) {
     return { unit: unit.replace("rad", "°"), scale: DEGREE, digits: preset < 0.05 ? 3 : 1 };
   if (/^m\b/.test(unit) && preset !== null && preset < 0.1)
     return { unit: unit.replace("m", "mm"), scale: 0.001, digits: 1 };
+  if (unit === "1/m") return { unit: "mm/m²", scale: 0.001, digits: 3 };
   if (/^m\b/.test(unit)) return { unit, scale: 1, digits: 3 };
   return { unit, scale: 1, digits: integer ? 0 : Math.max(3, decimals(preset) + 1) };
 }

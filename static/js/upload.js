@@ -3,7 +3,7 @@
 import { address, NO_ANSWER, Problem, problemOf } from "./api.js";
 import { $, el, icon, iconButton, setText } from "./dom.js";
 import { refreshRecordings } from "./recordings.js";
-import { open } from "./session.js";
+import { open } from "./actions.js";
 import { showPanel } from "./tabs.js";
 import { QUESTION_MS, report, toast } from "./toasts.js";
 import { bytes } from "./units.js";
@@ -57,7 +57,7 @@ async function upload(file, overwrite = false) {
     await open({ kind: "recording", name: file.name });
   } catch (problem) {
     if (problem.status === 409 && !overwrite) offerOverwrite(file);
-    else if (problem.status !== ABORTED) report(problem, "The file was not taken");
+    else if (problem.status !== ABORTED) report(problem, "The upload failed");
   } finally {
     row.node.remove();
   }

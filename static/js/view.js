@@ -1,13 +1,18 @@
 // What the scene shows: layers, colours, the size of the ellipses, and the legend that says so.
 
 import { chip, selectRow, switchRow } from "./bindings.js";
-import { $, el, remake, swatch } from "./dom.js";
+import { settings } from "./actions.js";
+import { $, el, remake } from "./dom.js";
 import { stroke } from "./figure.js";
 import { parameterRow } from "./parameters.js";
-import { on } from "./store.js";
+import { ownChoices } from "./own.js";
+import { get, on } from "./store.js";
+import { shape } from "./svg.js";
 import { fixed } from "./units.js";
 
-const OF_MAP = ["pose", "trail", "dead_reckoned", "truth", "landmarks", "associations"];
+const OF_MAP = ["pose", "trail", "dead_reckoned", "truth", "occupancy", "walls", "landmarks", "associations"];
+
+const narrow = matchMedia("(max-width: 1199px)"); // where the room needs the place
 
 const COLOURS = { plain: "Plain", segment: "By segment", quality: "By quality", range: "By range" };
 
@@ -21,10 +26,24 @@ export function mountView() {
       layerChips(fields, { ofMap: false }),
       selectRow("Point colour", "view.colour", options),
       parameterRow({ ...scale, label: "Ellipse scale", unit: "× σ" }),
+      resetRow(),
     );
     $("rejection-toggle").replaceChildren(switchRow("Show them in the scene", "view.layers.rejected"));
   });
-  on(["frame", "settings", "methods"], drawLegend);
+  $("legend").open = !narrow.matches;
+  for (const key of ["frame", "settings", "methods", "sizes"]) on([key], refreshLegend);
+}
+
+function refreshLegend() {
+  const [frame, settings, methods] = ["frame", "settings", "methods"].map(get);
+  if (frame && settings && methods) drawLegend(frame, settings, methods, get("sizes"));
+}
+
+/** Layers, theme, rotation and the size of ellipses are this browser's own. */
+function resetRow() {
+  const button = el("button", { type: "button", class: "button", onclick: settings.forgetOwn }, "Reset the view");
+  on(["settings"], () => (button.disabled = ownChoices().length === 0));
+  return el("div", { class: "buttons" }, button);
 }
 
 /** Toggles for the layers of the scene: those of a scan, or those of the map. */
@@ -38,39 +57,84 @@ export function layerChips(fields, { ofMap }) {
   return group;
 }
 
+/** What is drawn of a scan besides walls and corners: layer -> sign. */
+const OF_SCAN = [
+  { layer: "corners", sign: "corner-sign", label: "Corner" },
+  { layer: "points", sign: "point-sign", label: "Point", isKnown: ({ colour_scale: scale }) => !scale },
+  { layer: "sensor", sign: "sensor-sign", label: "Sensor" },
+  { layer: "rejected", sign: "rejected-sign", label: "Rejected" },
+  { layer: "clusters", sign: "cluster-sign", label: "Cluster, 2σ" },
+  { layer: "gaps", sign: "gap-sign", label: "Lost sector", isKnown: ({ gaps }) => gaps.length },
+];
+
 /** The ways of the sensor that the scene may show: layer -> sign, and whether it is known. */
 const PATHS = [
-  { layer: "trail", sign: "trail", label: "Estimated way", isKnown: () => true },
+  { layer: "trail", sign: "trail", label: "Estimated path", isKnown: () => true },
   {
     layer: "dead_reckoned",
     sign: "reckoned",
-    label: "By odometry alone",
+    label: "Odometry path",
     isKnown: ({ dead_reckoned: way }) => way,
   },
-  { layer: "truth", sign: "true", label: "True way", isKnown: ({ truth }) => truth },
+  { layer: "truth", sign: "true", label: "True path", isKnown: ({ truth }) => truth },
 ];
 
 /** What is drawn of the map: layer -> signs. */
 const MAPPED = [
+  { layer: "walls", sign: "mapped-wall", label: "Wall of the map" },
   { layer: "landmarks", sign: "landmark", label: "Landmark" },
   { layer: "landmarks", sign: "tentative", label: "Tentative" },
   { layer: "associations", sign: "association", label: "Match" },
 ];
 
-/** The legend names the methods and ways in the frame and states by how much the ellipses are enlarged. */
-function drawLegend(frame, settings, methods) {
+const SIZES = { grown: "too small to see: drawn larger", shrunk: "larger than the view: drawn smaller" };
+
+/** The legend names what is drawn, and says by how much the ellipses are enlarged and what the colours of points mean. */
+function drawLegend(frame, settings, methods, sizes) {
   const { ellipse_scale: scale, layers } = settings.view;
-  const { localization: now } = frame;
+  const { localization: now, colour_scale: colours } = frame;
   const paths = PATHS.filter(({ layer, isKnown }) => now && layers[layer] && isKnown(now));
-  const mapped = MAPPED.filter(({ layer }) => now && layers[layer]);
-  const ellipses = `Ellipses 1σ × ${fixed(scale, Number.isInteger(scale) ? 0 : 1)}, ${frame.covariance}`;
-  const shown = [frame.methods, paths, mapped, layers.ellipses];
-  remake($("legend"), [...shown, ellipses], () => {
-    const titles = new Map(methods.map(({ name, title }) => [name, title]));
+  const { mode, method } = settings.navigation;
+  const ofScans = mode === "slam" && method === "scans";
+  const mapped = MAPPED.filter(({ layer }) => now && layers[layer] && (layer === "walls") === ofScans);
+  const ofScan = OF_SCAN.filter(({ layer, isKnown }) => layers[layer] && (isKnown?.(frame) ?? true));
+  const signs = [...ofScan, ...paths, ...mapped];
+  const notes = layers.ellipses ? ellipseNotes(frame, scale, sizes) : ["Ellipses hidden"];
+  const shown = [frame.methods, signs, notes, colours, document.documentElement.dataset.theme];
+  remake($("legend-body"), shown, () => {
+    const titles = new Map(methods.map(({ name, title, dash }) => [name, { title, dash }]));
     const entries = [
-      ...frame.methods.map((name) => el("li", { class: "method-name" }, swatch(name), titles.get(name) ?? name)),
-      ...[...paths, ...mapped].map(({ sign, label }) => el("li", {}, stroke(sign), label)),
+      ...frame.methods.map((name) => methodEntry(name, titles.get(name))),
+      ...signs.map(({ sign, label }) => el("li", {}, stroke(sign), label)),
     ];
-    return [el("ul", {}, ...entries), el("p", {}, layers.ellipses ? ellipses : "Ellipses hidden")];
+    return [
+      el("ul", {}, ...entries),
+      ...(colours ? [scaleOf(colours)] : []),
+      ...notes.map((note) => el("p", {}, note)),
+    ];
   });
+}
+
+/** A method with a piece of its outline: colour and dash. */
+function methodEntry(name, { title, dash }) {
+  const outline = shape("path", { method: name, d: "M0 5H22", "stroke-dasharray": dash.join(" ") });
+  const sign = shape("svg", { class: "outline-sign", viewBox: "0 0 22 10", "aria-hidden": "true" }, outline);
+  return el("li", { class: "method-name" }, sign, title);
+}
+
+function ellipseNotes({ methods, covariance }, scale, sizes) {
+  const enlarged = `Ellipses 1σ × ${fixed(scale, Number.isInteger(scale) ? 0 : 1)}, ${covariance}`;
+  const apart = methods.length > 1 ? ["Outlines that would coincide lie 3 px apart"] : [];
+  const resized = Object.entries(SIZES)
+    .filter(([size]) => sizes?.[size])
+    .map(([size, words]) => `${sizes[size]} ${words}`);
+  return [enlarged, ...apart, ...resized];
+}
+
+/** Colours that mean a number, with the numbers at their ends. */
+function scaleOf({ high, unit, stops }) {
+  const ramp = el("span", { class: "ramp", "aria-hidden": "true" });
+  ramp.style.background = `linear-gradient(90deg, ${stops.join(", ")})`;
+  const label = unit ? "Range" : "Quality";
+  return el("p", { class: "colour-scale" }, label, el("span", {}, "0"), ramp, el("span", {}, `${fixed(high, 0)}\u2009${unit}`));
 }

@@ -14,7 +14,7 @@ ENVIRONMENT = {name: value for name, value in os.environ.items() if not name.sta
 
 
 def run(*arguments: object, timeout: float = 120) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "app.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "lidarcore_app.cli.main", *map(str, arguments)]
     return subprocess.run(command, cwd=ROOT, env=ENVIRONMENT, capture_output=True, text=True, timeout=timeout)
 
 
@@ -33,7 +33,7 @@ class Serving:
 
     def __init__(self, *arguments: object, **options: Any) -> None:
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "app.cli", "serve", *map(str, arguments)],
+            [sys.executable, "-m", "lidarcore_app.cli.main", "serve", *map(str, arguments)],
             cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
             **{"env": ENVIRONMENT} | options,
         )  # fmt: skip

@@ -14,13 +14,13 @@ from urllib.parse import urlsplit
 import httpx
 import numpy as np
 import viser
+from lidarcore_app.pipeline.runtime import Runtime
+from lidarcore_app.web.server import ServerOptions, create_app
+from lidarcore_app.web.serving import listen, uvicorn_server
 from waiting import PATIENCE
 from waiting import wait_until as wait_until
 from websockets.sync.client import ClientConnection, connect
 
-from app.runtime import Runtime
-from app.serve import listen, uvicorn_server
-from app.server import ServerOptions, create_app
 from lidarcore import open_recording
 
 ROOT = Path(__file__).parents[2]
@@ -36,8 +36,8 @@ class Server:
         self._maps = TemporaryDirectory()
         maps = {"map": str(Path(self._maps.name) / "landmarks.db")}
         app = create_app(ServerOptions(recordings=folder, **maps | options))
-        self.runtime: Runtime = app.state.runtime
-        self.viser: viser.ViserServer = app.state.viser
+        self.runtime: Runtime = app.state.server.runtime
+        self.viser: viser.ViserServer = app.state.server.viser.server
         self.folder = folder
         self._listening = listen("127.0.0.1", 0)
         self.port: int = self._listening.getsockname()[1]

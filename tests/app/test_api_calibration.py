@@ -4,24 +4,32 @@ import asyncio
 import json
 import threading
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 
 import httpx
 import numpy as np
 import pytest
+from lidarcore_app.cli.options import settings_from
+from lidarcore_app.sources.live import DeviceOptions
+from lidarcore_app.web.server import ServerOptions, create_app
 from serving import Json, Server, assert_problem, chosen
 from waiting import wait_until
 
-from app.cli_options import settings_from
-from app.live import DeviceOptions
-from app.server import ServerOptions, create_app
 from lidarcore import Client, SensorNoise
 from lidarcore.simulation import SimulatedSensor
 from lidarcore.simulation.rooms import rectangular_room
 
 NOISE = SensorNoise(0.008, 0.002)
 POSE = np.array([0.5, 0.3, 0.2])
-PROFILE = {"extraction": {"noise": {"sigma_range": 0.012, "sigma_bearing": 0.0011}}}
+
+
+def profile_of(sigma_range: float, sigma_bearing: float, **parts: float) -> Json:
+    return {"extraction": {"noise": asdict(SensorNoise(sigma_range, sigma_bearing, **parts))}}
+
+
+PROFILE = profile_of(0.012, 0.0011, range_growth=3e-4, unevenness=0.004, unevenness_length=0.1)
+OLD_PROFILE = {"extraction": {"noise": {"sigma_range": 0.012, "sigma_bearing": 0.0011}}}
 
 
 def write_standing(path: Path, scans: int, since: float = 100.0, step: float = 0.0) -> Path:
@@ -109,12 +117,12 @@ def test_before_the_kernels_are_compiled_it_says_so(tmp_path: Path) -> None:
         state = asyncio.run(ask("GET"))
         assert state["state"] == "collecting"
         assert "kernels are still being compiled" in state["message"]
-        app.state.runtime.ready = True
+        app.state.server.runtime.ready = True
         assert asyncio.run(ask("GET"))["message"] is None
     finally:
-        app.state.runtime.player.close()
-        app.state.viser.stop()
-        app.state.landmarks.close()
+        app.state.server.runtime.player.close()
+        app.state.server.viser.server.stop()
+        app.state.server.landmarks.close()
 
 
 def test_one_at_a_time_and_cancelled(server: Server, standing: Path) -> None:
@@ -158,16 +166,28 @@ def test_a_profile_is_saved_used_and_deleted(server: Server) -> None:
     settings = server.change("PATCH", "/settings", server.get("/profiles/hall"))
     assert settings["extraction"]["noise"] == PROFILE["extraction"]["noise"]
     file = server.folder.parent / "profiles" / "hall.json"
-    assert settings_from(file, None).extraction.noise == SensorNoise(0.012, 0.0011)
+    assert asdict(settings_from(file, None).extraction.noise) == PROFILE["extraction"]["noise"]
     assert server.http.delete("/profiles/hall").status_code == 204
     assert not file.exists()
     assert_problem(server.http.delete("/profiles/hall"), 404)
     assert_problem(server.http.get("/profiles/hall"), 404)
 
 
+def test_a_profile_from_before_walls_were_uneven_is_read_and_says_that_they_are_straight(
+    server: Server,
+) -> None:
+    server.change("PUT", "/profiles/hall", PROFILE)
+    server.change("PATCH", "/settings", server.get("/profiles/hall"))
+    folder = server.folder.parent / "profiles"
+    (folder / "old.json").write_text(json.dumps(OLD_PROFILE))
+    settings = server.change("PATCH", "/settings", server.get("/profiles/old"))
+    assert settings["extraction"]["noise"] == asdict(SensorNoise(0.012, 0.0011))
+    assert settings_from(folder / "old.json", None).extraction.noise == SensorNoise(0.012, 0.0011)
+
+
 def test_a_name_that_is_taken_is_replaced_only_on_demand(server: Server) -> None:
     server.change("PUT", "/profiles/hall", PROFILE)
-    other = {"extraction": {"noise": {"sigma_range": 0.03, "sigma_bearing": 0.002}}}
+    other = profile_of(0.03, 0.002)
     assert_problem(server.http.put("/profiles/hall", json=other), 409)
     assert server.get("/profiles/hall") == PROFILE
     server.http.put("/profiles/hall", json=other, params={"overwrite": True}).raise_for_status()
@@ -191,9 +211,7 @@ def put_at_once(server: Server, bodies: list[Json], **params: object) -> list[in
 
 
 def test_many_who_save_at_once_do_not_disturb_each_other(server: Server) -> None:
-    bodies = [
-        {"extraction": {"noise": {"sigma_range": 0.01 * n, "sigma_bearing": 0.001}}} for n in range(1, 17)
-    ]
+    bodies = [profile_of(0.01 * n, 0.001) for n in range(1, 17)]
     for _ in range(5):
         assert put_at_once(server, bodies) == [201] + [409] * 15
         assert put_at_once(server, bodies, overwrite=True) == [201] * 16
@@ -264,7 +282,7 @@ def test_the_client_calibrates_saves_and_uses(server: Server, standing: Path) ->
         noise = robot.calibration()["result"]["noise"]
         robot.save_profile("hall", noise["sigma_range"], noise["sigma_bearing"])
         assert [profile["name"] for profile in robot.profiles()] == ["hall"]
-        assert robot.use_profile("hall")["extraction"]["noise"] == noise
+        assert robot.use_profile("hall")["extraction"]["noise"] == asdict(SensorNoise(**noise))
         robot.delete_profile("hall")
         assert robot.profiles() == []
 
@@ -272,9 +290,8 @@ def test_the_client_calibrates_saves_and_uses(server: Server, standing: Path) ->
 def test_profiles_of_the_command_are_those_of_the_server(
     server: Server, standing: Path, make_server: Callable[..., Server]
 ) -> None:
+    from lidarcore_app.cli.main import cli
     from typer.testing import CliRunner
-
-    from app.cli import cli
 
     folder = server.folder.parent / "profiles"
     folder.mkdir()
@@ -282,4 +299,4 @@ def test_profiles_of_the_command_are_those_of_the_server(
     assert result.exit_code == 0, result.output
     found = json.loads(result.output)
     (entry,) = server.get("/profiles")["profiles"]
-    assert entry["noise"] == found["noise"]
+    assert entry["noise"] == asdict(SensorNoise(**found["noise"]))

@@ -10,11 +10,11 @@ import pytest
 from scipy.stats import chi2
 from serving import Json, Server, assert_problem, chosen, wait_until
 
-from lidarcore.poses import wrap
+from lidarcore.geometry import wrap
 from lidarcore.simulation.routes import Limits
 
 SPEED = Limits().speed  # m/s, at most
-SLAM = {"navigation": {"mode": "slam"}}
+SLAM = {"navigation": {"mode": "slam", "method": "landmarks"}}
 ODOMETRY = {"stamp": 50.0, "x": 0.0, "y": 0.0, "heading": 0.0}
 
 
@@ -231,6 +231,21 @@ def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(drivi
     driving.change("PUT", "/localization/map", {"session": None})
     driving.change("PATCH", "/settings", SLAM)
     located(driving, lambda where: where["mode"] == "slam")
+
+
+def test_a_recording_that_is_opened_again_leaves_one_map_beside_the_one_that_is_built(
+    server: Server, room: Path
+) -> None:
+    def maps() -> list[int]:
+        return [session["id"] for session in server.get("/sessions")["sessions"]]
+
+    server.change("PATCH", "/settings", SLAM)
+    built: list[int] = []
+    for _ in range(4):
+        server.change("PUT", "/source", {"kind": "recording", "name": room.name})
+        wait_until(lambda: server.get("/localization")["session"] not in (None, *built))
+        built.append(server.get("/localization")["session"])
+    wait_until(lambda: maps() == built[-2:])
 
 
 def test_a_scan_that_was_passed_over_does_not_end_the_map_when_it_is_met(server: Server, room: Path) -> None:

@@ -6,7 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lidarcore_app.errors import NotFoundError
+from lidarcore_app.sources.trash import Trash
 from serving import Server, assert_problem, chosen, wait_until, write_room
+
+from lidarcore import open_recording
 
 BAD_NAMES = [
     "../up.npz", "%2e%2e%2fup.npz", "..%5cup.npz", "a%2fb.npz", "%2fetc%2fup.npz", ".hidden", "..", "%2e%2e",
@@ -158,3 +162,68 @@ def test_hidden_files_and_other_folders_are_not_listed_but_bags_are(server: Serv
     assert server.http.delete("/recordings/bag").status_code == 204
     assert_problem(server.http.delete("/recordings/folder"), 404)
     assert (server.folder / "folder").is_dir()
+
+
+def test_what_was_deleted_can_be_taken_back_until_it_is_gone(server: Server, room: Path) -> None:
+    before = room.read_bytes()
+    assert server.http.delete("/recordings/room.npz").status_code == 204
+    assert server.recordings() == []
+    entry = server.http.post("/recordings/room.npz/restore").raise_for_status().json()
+    assert server.recordings() == [entry]
+    assert room.read_bytes() == before
+    assert files(server.folder) == ["recordings", "recordings/room.npz"]
+    assert_problem(server.http.post("/recordings/none.npz/restore"), 404)
+    assert server.http.delete("/recordings/room.npz").status_code == 204
+    room.write_bytes(before)
+    assert_problem(server.http.post("/recordings/room.npz/restore"), 409)
+    server.stop()
+    assert files(server.folder) == ["recordings", "recordings/room.npz"]
+
+
+def test_the_trash_keeps_what_was_deleted_last_and_empties_itself(tmp_path: Path) -> None:
+    file = tmp_path / "room.npz"
+    trash = Trash(undo_within=0.5)
+    for text in ("old", "new"):
+        file.write_text(text)
+        trash.put(file)
+    trash.take_back(file)
+    assert file.read_text() == "new"
+    wait_until(lambda: [path.name for path in tmp_path.iterdir()] == ["room.npz"])
+    with pytest.raises(NotFoundError, match=r"kept for 0\.5 s"):
+        trash.take_back(file)
+
+
+def test_a_recording_gets_another_name(server: Server, room: Path) -> None:
+    demo = next(r["name"] for r in server.get("/recordings")["recordings"] if r["builtin"])
+    other = write_room(server.folder / "other.npz").read_bytes()
+    for name, new, status in (
+        ("none.npz", "new.npz", 404),
+        (demo, "new.npz", 409),
+        ("room.npz", "other.npz", 409),
+        ("room.npz", "../up.npz", 422),
+        ("room.npz", ".hidden", 422),
+    ):
+        assert_problem(server.http.patch(f"/recordings/{name}", json={"name": new}), status)
+    entry = server.http.patch("/recordings/room.npz", json={"name": "hall 1.npz"}).raise_for_status().json()
+    assert entry["name"] == "hall 1.npz"
+    assert files(server.folder) == ["recordings", "recordings/hall 1.npz", "recordings/other.npz"]
+    assert (server.folder / "other.npz").read_bytes() == other
+
+
+def test_a_recording_is_downloaded_as_it_is_and_says_what_it_holds(server: Server, room: Path) -> None:
+    answer = server.http.get("/recordings/room.npz")
+    assert answer.content == room.read_bytes()
+    assert 'attachment; filename="room.npz"' in answer.headers["content-disposition"]
+    scans = list(open_recording(room))
+    wanted = {"scans": len(scans), "duration": scans[-1].stamp - scans[0].stamp, "problem": None}
+    found = server.get("/recordings/room.npz/facts")
+    assert found.items() >= wanted.items()
+    assert found["format"]
+    (server.folder / "bad.bag").write_bytes(b"nothing")
+    found = server.get("/recordings/bad.bag/facts")
+    assert (found["scans"], found["duration"]) == (None, None)
+    assert "bad.bag" in found["problem"]
+    (server.folder / "folder").mkdir()
+    (server.folder / "folder" / "bag_0.db3").write_bytes(b"SQLite format 3\0")
+    assert_problem(server.http.get("/recordings/folder"), 409)
+    assert_problem(server.http.get("/recordings/none.npz"), 404)

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lidarcore_app.jobs.repeatability import LiveRepeatability
+from lidarcore_app.pipeline.frame import Frame
+from lidarcore_app.web.routes.repeatability import OFF
 from pydantic_core import to_json
 from serving import Json, Server, assert_problem, room_ranges, strict_json, write_room
 from waiting import wait_until
 
-from app.api.repeatability import OFF
-from app.frame import Frame
-from app.repeatability import LiveRepeatability
 from lidarcore import Client, ExtractionSettings, compare, open_recording
-from lidarcore.evaluation.repeatability import Repeatability
-from lidarcore.evaluation.repeatability_tables import to_csv
+from lidarcore.evaluation.repeatability.statistics import Repeatability
+from lidarcore.evaluation.repeatability.tables import to_csv
 
 ON = {"repeatability": {"running": True}}
 FEW = 6
@@ -45,7 +45,7 @@ def step(server: Server, count: int, since: int) -> Json:
 def show(server: Server, by: int) -> None:
     """Step so many scans, and wait until that one is worked on."""
     index = server.change("POST", "/source/step", {"by": by})["index"]
-    wait_until(lambda: server.runtime.frame.taken.position["index"] == index)
+    wait_until(lambda: server.runtime.frame.timed.position.index == index)
 
 
 def by_hand(path: Path, indices: range, **settings: Any) -> Repeatability:
@@ -108,7 +108,7 @@ def test_it_tells_what_the_library_finds_in_the_same_scans(standing: Server) -> 
         assert client.repeatability() == told
 
 
-def test_the_dots_of_a_corner_scatter_as_the_summary_says(standing: Server) -> None:
+def test_the_dots_of_corners_and_walls_scatter_as_the_summary_says(standing: Server) -> None:
     for method in found(standing)["methods"]:
         for corner in method["corners"]:
             dots = standing.get(f"/repeatability/corners/{corner['id']}")
@@ -117,6 +117,14 @@ def test_the_dots_of_a_corner_scatter_as_the_summary_says(standing: Server) -> N
             assert len(xy) == corner["count"]
             np.testing.assert_allclose(xy.mean(0), 0, atol=1e-12)  # m, of sums of metres
             np.testing.assert_allclose(np.cov(xy.T), corner["scatter"])
+    for method in found(standing)["walls"]["methods"]:
+        assert len(method["walls"]) == 4
+        for wall in method["walls"]:
+            dots = standing.get(f"/repeatability/walls/{wall['id']}")
+            np.testing.assert_allclose(
+                np.cov(np.array(dots["deviations"][method["name"]]).T), wall["scatter"]
+            )
+    assert_problem(standing.http.get("/repeatability/walls/99999"), 404)
     problem = assert_problem(standing.http.get("/repeatability/corners/99999"), 404)
     assert "99999" in problem["detail"]
     assert_problem(standing.http.get(f"/repeatability/corners/{10**30}"), 404)
@@ -229,7 +237,7 @@ def test_looking_back_at_a_live_source_neither_counts_twice_nor_begins_anew(watc
     frames: list[Frame] = []
     watching.runtime.frame_listeners.append(frames.append)
     watching.change("PATCH", "/settings", ON)
-    wait_until(lambda: frames and frames[-1].taken.position["kind"] == "device", "the sensor is watched")
+    wait_until(lambda: frames and frames[-1].timed.position.kind == "device", "the sensor is watched")
     watching.http.delete("/repeatability").raise_for_status()
     counts = [0]
 
@@ -244,12 +252,12 @@ def test_looking_back_at_a_live_source_neither_counts_twice_nor_begins_anew(watc
     watching.change("PATCH", "/source", {"state": "playing"})
     wait_until(lambda: counted(counts[0] + 20), "it goes on")
     assert counts == sorted(counts)
-    watched = [frame for frame in frames if frame.taken.position["kind"] == "device"]
-    assert counts[-1] <= len({frame.taken.position["index"] for frame in watched}) < len(watched)
+    watched = [frame for frame in frames if frame.timed.position.kind == "device"]
+    assert counts[-1] <= len({frame.timed.position.index for frame in watched}) < len(watched)
 
 
 def sought(frame: Frame, seeks: int) -> Frame:
-    return replace(frame, taken=replace(frame.taken, seeks=seeks))
+    return replace(frame, timed=replace(frame.timed, seeks=seeks))
 
 
 @pytest.fixture
@@ -273,7 +281,7 @@ def room() -> Iterator[LiveRepeatability]:
 
 def told(room: LiveRepeatability, frames: list[Frame], count: int) -> None:
     for frame in frames:
-        room.tell(frame)
+        room.observe(frame)
     wait_until(lambda: room.summary().scans == count, f"{count} scans are in the window")
 
 
@@ -281,7 +289,7 @@ def test_a_scan_that_cannot_be_worked_on_does_not_end_it(
     room: LiveRepeatability, frames: list[Frame], caplog: pytest.LogCaptureFixture
 ) -> None:
     def broken(frame: Frame) -> Frame:
-        return replace(frame, taken=replace(frame.taken, scan=None))
+        return replace(frame, timed=replace(frame.timed, scan=None))
 
     told(room, frames[:2], 2)
     told(room, [broken(frames[2]), broken(frames[3]), frames[4]], 3)
@@ -293,11 +301,11 @@ def test_scans_that_wait_while_it_is_begun_anew_are_dropped(
 ) -> None:
     """Only the one told of afterwards is in the window; its boxes are those of that scan alone."""
     for frame in frames[:-1]:
-        room.tell(frame)
+        room.observe(frame)
     room.clear()
-    room.tell(frames[-1])
+    room.observe(frames[-1])
     alone = Repeatability()
-    alone.add(compare(frames[-1].taken.scan, frames[-1].settings.extraction))
+    alone.add(compare(frames[-1].timed.scan, frames[-1].settings.extraction))
     wait_until(lambda: room.summary() == alone.summary(), "the last scan alone is in the window")
 
 

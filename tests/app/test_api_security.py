@@ -21,6 +21,8 @@ MUTATIONS = [
     ("POST", "/emulator", {"command": "unplug"}),
     ("PUT", "/recordings/new.npz", {}),
     ("DELETE", "/recordings/room.npz", None),
+    ("PATCH", "/recordings/other.npz", {"name": "renamed.npz"}),
+    ("POST", "/recordings/room.npz/restore", None),
     ("POST", "/pose", {"x": 1, "y": 1, "heading": 0}),
     ("POST", "/odometry", {"stamp": 1, "x": 1, "y": 1, "heading": 0}),
     ("POST", "/localization/reset", None),

@@ -2,9 +2,8 @@ import json
 from pathlib import Path
 
 import pytest
+from lidarcore_app.pipeline.settings import Settings
 from serving import Server, assert_problem, chosen
-
-from app.settings import Settings
 
 
 def test_a_patch_changes_what_it_names_and_returns_everything(server: Server) -> None:
@@ -53,7 +52,7 @@ def test_while_paused_the_current_scan_is_processed_again(server: Server, room: 
     [
         ({"extraction": {"gapp": 1}}, "/extraction/gapp"),
         ({"extraction": {"noise": {"sigma": 1}}}, "/extraction/noise/sigma"),
-        ({"view": {"layers": {"walls": True}}}, "/view/layers/walls"),
+        ({"view": {"layers": {"ceilings": True}}}, "/view/layers/ceilings"),
         ({"colour": "red"}, "/colour"),
         ({"extraction": {"gap": -1}}, "/extraction/gap"),
         ({"extraction": {"gap": "0.3"}}, "/extraction/gap"),

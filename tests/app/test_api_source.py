@@ -4,14 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lidarcore_app.pipeline.frame import Frame
+from lidarcore_app.sources.player import LATE, Player
+from lidarcore_app.sources.recorded import RecordingSource
+from lidarcore_app.sources.timed_scan import TimedScan
 from mcap_ros2.writer import Writer
 from serving import Json, Server, Stream, assert_problem, chosen, wait_until, write_room
 from waiting import PATIENCE, soonest
-
-from app.frame import Frame
-from app.player import LATE, Player
-from app.sources import RecordingSource
-from app.taken import Taken
 
 LASER_SCAN = """std_msgs/Header header
 float32 angle_min
@@ -104,7 +103,7 @@ def test_stepping_pauses_what_plays(server: Server, room: Path) -> None:
 @pytest.mark.parametrize("speed", [1, 4])
 def test_a_recording_keeps_the_pace_of_its_stamps(tmp_path: Path, speed: int) -> None:
     room = write_room(tmp_path / "paced.npz", scans=21, period=0.1)
-    handed_over: list[Taken] = []
+    handed_over: list[TimedScan] = []
     ended = threading.Event()
 
     def too_slow_by() -> float:
@@ -115,13 +114,13 @@ def test_a_recording_keeps_the_pace_of_its_stamps(tmp_path: Path, speed: int) ->
             RecordingSource(room),
             hand_over=handed_over.append,
             is_idle=lambda: True,
-            changed=lambda: player.describe()["state"] == "ended" and ended.set(),
+            changed=lambda: player.status().state == "ended" and ended.set(),
         )
         player.control(speed=speed, loop=False)
         player.start()
         assert ended.wait(PATIENCE)
         player.close()
-        assert [taken.position["index"] for taken in handed_over] == list(range(21))
+        assert [taken.position.index for taken in handed_over] == list(range(21))
         after = np.array([taken.arrival - handed_over[0].arrival for taken in handed_over])
         assert (after >= np.arange(21) * 0.1 / speed - LATE).all()
         return float(after[-1] - 2.0 / speed)
@@ -134,8 +133,8 @@ def test_at_the_end_it_stops_and_playing_on_starts_again(server: Server) -> None
     seen: list[int] = []
 
     def note(frame: Frame) -> None:
-        if frame.taken.name == room.name:
-            seen.append(frame.taken.position["index"])
+        if frame.timed.name == room.name:
+            seen.append(frame.timed.position.index)
 
     server.runtime.frame_listeners.append(note)
     server.change("PATCH", "/source", {"loop": False, "speed": 0, "state": "paused"})
@@ -162,7 +161,7 @@ def test_as_fast_as_possible_drops_nothing(server: Server) -> None:
     with server.stream() as stream:
         server.change("PUT", "/source", {"kind": "recording", "name": room.name, "paused": True})
         wait_until_complete(stream, room.name)
-        server.runtime.frame_listeners.append(lambda f: seen.append(f.taken.position["index"]))
+        server.runtime.frame_listeners.append(lambda f: seen.append(f.timed.position.index))
         started = time.monotonic()
         server.change("PATCH", "/source", {"state": "playing"})
         stream.frame(lambda f: f["source"]["index"] == 399)

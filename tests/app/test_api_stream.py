@@ -9,14 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 import httpx
+import lidarcore_app.web.stream
 import pytest
 import websockets
+from lidarcore_app.pipeline.newest import NewestScan
+from lidarcore_app.web.stream import Mailbox
+from lidarcore_app.web.transport import SEND_BUFFER
 from serving import ROOT, Json, Server, strict_json, write_room
 from waiting import PATIENCE
-
-from app.runtime import Slot
-from app.stream import Mailbox
-from app.transport import SEND_BUFFER
 
 RECEIVE_BUFFER = 8192
 
@@ -57,13 +57,11 @@ def test_every_change_is_told_to_every_client(server: Server, room: Path) -> Non
             assert other.state(holds)
 
 
-def test_a_mailbox_holds_one_frame_the_newest() -> None:
-    class Frame:
-        def __init__(self, n: int) -> None:
-            self.text = json.dumps({"n": n})
+def test_a_mailbox_holds_one_frame_the_newest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lidarcore_app.web.stream, "frame_text", lambda frame, points: json.dumps(frame))
 
     async def scenario() -> None:
-        mailbox, frames = Mailbox(points=False), [Frame(n) for n in range(5)]
+        mailbox, frames = Mailbox(points=False), [{"n": n} for n in range(5)]
         for frame in frames:
             mailbox.put_frame(frame)
         mailbox.put_state()
@@ -82,7 +80,7 @@ def test_a_slot_counts_what_it_drops_but_not_the_same_scan_again() -> None:
         def __init__(self, scan: object) -> None:
             self.scan = scan
 
-    slot, scans = Slot(), [object(), object(), object()]
+    slot, scans = NewestScan(), [object(), object(), object()]
     for scan in (scans[0], scans[0], scans[1], scans[2]):
         slot.put(Taken(scan))
     assert slot.dropped == 2
@@ -123,7 +121,7 @@ def test_twenty_clients_get_every_frame_in_order_and_memory_does_not_grow(
     command = [
         sys.executable,
         "-m",
-        "app.cli",
+        "lidarcore_app.cli.main",
         "serve",
         room,
         "--http-port",

@@ -12,10 +12,10 @@ import httpx
 import numpy as np
 import pyarrow.parquet
 import pytest
+from lidarcore_app.web.serving import listen
 from processes import Serving, assert_refused, run
 from serving import ROOT, write_room
 
-from app.serve import listen
 from lidarcore import ExtractionSettings, compare, open_recording
 
 
@@ -217,4 +217,4 @@ def test_a_recording_is_not_overwritten_with_its_own_result(tmp_path: Path) -> N
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
     room = write_room(tmp_path / "room.npz")
     assert_refused(run("process", room, "-o", tmp_path / "none" / "room.csv"), "no folder", "none")
-    assert_refused(run("serve", "--port", "0", "--recordings", room), "is no folder")
+    assert_refused(run("serve", "--port", "0", "--recordings", room), "is not a folder")

@@ -10,7 +10,7 @@ import pytest
 from processes import assert_refused, run
 
 from lidarcore import Scan
-from lidarcore.poses import compose, inverse
+from lidarcore.geometry import compose, inverse
 from lidarcore.recordings.writer import RecordingWriter
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
@@ -58,11 +58,11 @@ def test_a_map_that_slam_saved_is_one_to_localize_in(
     assert np.median(errors[1]) < 0.25
 
 
-def test_whole_scans_are_matched_without_landmarks(
+def test_a_map_of_whole_scans_has_the_poses_of_all_scans(
     scans: list[Scan], recording: Path, tmp_path: Path
 ) -> None:
-    poses = tmp_path / "poses.csv"
-    result = run("localize", recording, "--scans", "-o", poses, *NOISE)
+    poses = tmp_path / "map" / "poses.csv"
+    result = run("map", recording, "-o", poses.parent, *NOISE)
     assert result.returncode == 0, result.stderr
     assert "120 of them tracked" in result.stdout
     true = np.array([compose(inverse(scans[0].truth), scan.truth) for scan in scans])

@@ -13,7 +13,7 @@ import pytest
 from lidarcore import open_recording
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
-COMMAND = [sys.executable, "-m", "app.cli", "record"]
+COMMAND = [sys.executable, "-m", "lidarcore_app.cli.main", "record"]
 
 
 def run(*arguments):
@@ -33,10 +33,14 @@ def is_among(captured, scan):
 
 def test_it_records_for_a_while_and_says_how_much(tmp_path):
     output, raw = tmp_path / "a.mcap", tmp_path / "a.rplidar"
+    began = time.monotonic()
     done = run(output, "--emulator", "--duration", 2, "--raw", raw, "--set", "gap=0.3")
+    turned = 10 * (
+        time.monotonic() - began
+    )  # revolutions of the sensor, which a busy machine may get all at once
     assert done.returncode == 0, done.stderr
     scans = list(open_recording(output))
-    assert 15 <= len(scans) <= 25
+    assert 15 <= len(scans) <= turned
     assert scans[-1].stamp - scans[0].stamp == pytest.approx(2, abs=0.5)
     assert abs(scans[-1].stamp - time.time()) < 60
     assert re.search(rf"a\.mcap: {len(scans)} scans in \d\.\d s, \d\.\d MB, \d+ kB/s$", done.stdout.strip())

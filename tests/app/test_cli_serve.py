@@ -41,7 +41,7 @@ def test_without_an_argument_it_takes_an_emulated_sensor_and_says_so(serving: Se
         source = client.source()
         assert source["kind"] == "emulator"
         where = source["device"]["port"]
-        assert server.said == f"No RPLIDAR is connected: an emulated RPLIDAR S1 at {where} plays.\n"
+        assert server.said == f"No RPLIDAR is connected. Playing an emulated RPLIDAR S1 at {where}.\n"
         client.wait_for_scans()
     assert server.end()[1] == ""
 
@@ -50,7 +50,7 @@ def test_the_port_named_is_taken_and_run_as_asked(serving: Serve, sensor: Emulat
     server = serving("--http-port", 0, "--port", sensor.port, "--mode", "Standard", "--rpm", 720)
     with Client(server) as client:
         told = client.source()["device"]
-        assert server.said == f"RPLIDAR S1, serial {told['serial']}, at {sensor.port} plays.\n"
+        assert server.said == f"Playing RPLIDAR S1, serial {told['serial']}, at {sensor.port}.\n"
         assert (told["port"], told["mode"], told["rpm"]) == (sensor.port, "Standard", 720)
         client.wait_for_scans()
 

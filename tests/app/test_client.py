@@ -148,7 +148,7 @@ def test_a_robot_drives_by_it(make_server: Callable[..., Server], folder: Path) 
         with pytest.raises(ClientError, match="slam"):
             client.pose()
         assert client.trajectory() == []
-        assert client.set(navigation={"mode": "slam"})["navigation"]["mode"] == "slam"
+        assert client.set(navigation={"mode": "slam", "method": "landmarks"})["navigation"]["mode"] == "slam"
         assert client.settings()["navigation"]["mode"] == "slam"
         wait_until(lambda: client.sessions() and len(list(client.landmarks())) == 4)
         found = np.array([m.xy for m in client.landmarks()])

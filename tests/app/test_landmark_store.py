@@ -12,12 +12,12 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
+from lidarcore_app.jobs.landmark_store import LandmarkStore
+from lidarcore_app.jobs.map_writer import MapChange
 from processes import Serving
 from serving import ROOT, wait_until, write_room
 from waiting import PATIENCE
 
-from app.landmark_store import LandmarkStore
-from app.map_writer import MapChange
 from lidarcore.errors import UnknownSessionError
 from lidarcore.landmarks import Atlas
 from lidarcore.localization import Landmarks, Points
@@ -63,7 +63,7 @@ def test_confirmed_landmarks_get_into_a_session_of_their_run(store: LandmarkStor
     ]
     assert (run.session, store.session, change.session, change.removed) == (1, 1, 1, ())
     assert tuple(store.map()) == change.landmarks
-    assert [run.stored_id(id) for id in (100, 101, 102)] == [
+    assert [run.ids.get(id) for id in (100, 101, 102)] == [
         change.landmarks[0].id,
         None,
         change.landmarks[1].id,
@@ -117,6 +117,41 @@ def landmarks_of(name: str) -> np.ndarray:
     return {"xy": np.array([[3, 0]]), "counts": np.array([10]), "last_seen": np.array([5.0])}[name]
 
 
+def finish(store: LandmarkStore, replay: str | None) -> int:
+    """A run with a map, from its beginning to its end; the session."""
+    run = store.begin("room.mcap", replay=replay)
+    run.put(landmarks(2))
+    wait_until(lambda: run.session)
+    store.use(None)
+    wait_until(lambda: store.atlas.session(run.session).ended)
+    return run.session
+
+
+@pytest.mark.parametrize(("replay", "is_replaced"), [("again and again", True), (None, False)])
+def test_only_of_what_is_replayed_a_finished_map_takes_the_place_of_the_one_before(
+    store: LandmarkStore, replay: str | None, is_replaced: bool
+) -> None:
+    first, other, second = finish(store, replay), finish(store, "another recording"), finish(store, replay)
+    left = [other, second] if is_replaced else [first, other, second]
+    wait_until(lambda: [session.id for session in store.atlas.sessions()] == left)
+    run = store.begin("room.mcap", replay=replay)
+    run.put(landmarks(2))
+    wait_until(lambda: run.session)
+    assert [session.id for session in store.atlas.sessions()] == [*left, run.session]
+
+
+def test_a_map_in_use_stays_when_its_recording_is_mapped_again(store: LandmarkStore) -> None:
+    told, first = Told(store), finish(store, "again and again")
+    run = store.begin("room.mcap", replay="again and again")
+    run.put(landmarks(2))
+    while told.next().session == first:
+        pass
+    store.use(first)
+    wait_until(lambda: store.atlas.session(run.session).ended)
+    time.sleep(0.1)
+    assert [session.id for session in store.atlas.sessions()] == [first, run.session]
+
+
 def test_small_steps_add_up(store: LandmarkStore) -> None:
     """What was written counts, not what was seen last."""
     told, run = Told(store), store.begin("room.mcap")
@@ -138,7 +173,7 @@ def test_what_the_filter_gave_up_is_taken_out_and_its_history_stays(store: Landm
     assert change.removed == (second.id,)
     assert [m.id for m in store.map()] == [first.id, third.id]
     assert store.map().history(second.id) == [second]
-    assert run.stored_id(101) is None
+    assert run.ids.get(101) is None
 
 
 def test_runs_do_not_touch_each_other(store: LandmarkStore) -> None:
@@ -209,7 +244,7 @@ def test_a_locked_file_is_reported_holds_up_nobody_and_catches_up(store: Landmar
     assert "locked" in store.error
     run.put(landmarks(101))
     behind = time.monotonic() - first
-    assert store.status["behind_s"] >= behind  # what waits longest counts, however often a newer map comes
+    assert store.status.behind_s >= behind  # what waits longest counts, however often a newer map comes
     assert len(store.map()) == 1  # whoever reads goes on
     blocker.execute("ROLLBACK")
     assert len(told.next().landmarks) == 100
@@ -224,7 +259,7 @@ import resource, signal, sys, time
 from pathlib import Path
 import numpy as np
 from test_landmark_store import landmarks
-from app.landmark_store import LandmarkStore
+from lidarcore_app.jobs.landmark_store import LandmarkStore
 store = LandmarkStore(sys.argv[1])
 run = store.begin("full")
 limit = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -257,7 +292,7 @@ print(n, store.error)
 RUN = """
 import sys, time
 from test_landmark_store import landmarks
-from app.landmark_store import LandmarkStore
+from lidarcore_app.jobs.landmark_store import LandmarkStore
 store = LandmarkStore(sys.argv[1])
 store.listeners.append(lambda change: print("stored", *(m.id for m in change.landmarks), flush=True))
 run, n = store.begin("run"), 0
@@ -299,7 +334,9 @@ def test_what_a_server_told_of_its_map_is_there_after_it_was_killed(
     serving: Callable[..., Serving], tmp_path: Path
 ) -> None:
     room, path = write_room(tmp_path / "room.npz", scans=300), tmp_path / "maps.db"
-    server = serving(room, "--map", path, "--set", "navigation.mode=slam")
+    server = serving(
+        room, "--map", path, "--set", "navigation.mode=slam", "--set", "navigation.method=landmarks"
+    )
     told: list[int] = []
 
     def has_four() -> bool:

@@ -5,10 +5,10 @@ import os
 
 import numpy as np
 import pytest
+from lidarcore_app.sources.live import DeviceOptions, LiveSource, Taps
 from sensing import device, revolutions, settled
 from serving import Server, assert_problem, wait_until
 
-from app.live import DeviceOptions, LiveSource, Taps
 from lidarcore import Scan
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
@@ -137,5 +137,5 @@ def test_what_fails_beside_does_not_end_the_view(
     source.start(lambda: None, lambda: None)
     wait_until(lambda: source.count >= 4)
     source.close()
-    told = [record for record in caplog.records if record.name == "app.history"]
+    told = [record for record in caplog.records if record.name == "lidarcore_app.threads"]
     assert [record.exc_text.splitlines()[-1] for record in told] == ["OSError: the disk is full"]

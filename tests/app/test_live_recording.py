@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lidarcore_app.jobs.recorder import RecorderStatus
 from pydantic import TypeAdapter
 from sensing import device, revolutions, settled, watch
 from serving import Json, Server, Stream, assert_problem, chosen
 
-from app.recorder import RecorderJson
 from lidarcore import Scan, open_recording
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
 
 def start(server: Server, **options: object) -> Json:
     status: Json = server.change("POST", "/recorder/start", options)
-    TypeAdapter(RecorderJson).validate_python(status)
+    TypeAdapter(RecorderStatus).validate_python(status)
     return status
 
 

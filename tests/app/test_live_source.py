@@ -1,10 +1,17 @@
 """A sensor in the app: what is shown of it, and how it is steered. The sensor is the real emulator."""
 
+import json
 import statistics
 from functools import partial
 
+import lidarcore_app.sources.history
+import lidarcore_app.sources.live
+import lidarcore_app.web.routes.sensor
 import numpy as np
 import pytest
+from lidarcore_app.sources.live import DeviceOptions, Taps, connected_or_emulated
+from lidarcore_app.sources.player import SourceStatus
+from lidarcore_app.web.schemas import FrameJson
 from pydantic import TypeAdapter
 from sensing import device, revolutions, settled, unbroken, watch
 from serial.tools.list_ports import comports
@@ -12,12 +19,6 @@ from serial.tools.list_ports_common import ListPortInfo
 from serving import Server, assert_problem, chosen
 from waiting import soonest
 
-import app.api.sensor
-import app.history
-import app.live
-from app.live import DeviceOptions, Taps, connected_or_emulated
-from app.player import SourceJson
-from app.wire import FrameJson
 from lidarcore.rplidar import find_devices
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 
@@ -35,13 +36,14 @@ KNOWS = {
     "error": None,
     "reconnects": 0,
     "overruns": 0,
+    "checked": True,
 }
 
 
 def test_a_sensor_plays_and_says_what_it_is(server: Server, sensor: EmulatorProcess) -> None:
     with server.stream() as stream:
         answer = watch(server, sensor)
-        TypeAdapter(SourceJson).validate_python(answer, strict=True)
+        TypeAdapter(SourceStatus).validate_json(json.dumps(answer), strict=True)
         told = settled(stream)
         frame = stream.frame(chosen)
     assert {name: answer[name] for name in ("kind", "live", "recording", "count", "duration", "complete")} == {
@@ -149,7 +151,7 @@ def test_while_paused_kept_revolutions_are_stepped_through_and_playing_shows_the
 def test_what_is_looked_at_stays_when_it_is_older_than_what_is_kept(
     server: Server, sensor: EmulatorProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(app.history, "HISTORY", 5)
+    monkeypatch.setattr(lidarcore_app.sources.history, "HISTORY", 5)
     watch(server, sensor)
     with server.stream() as stream:
         revolutions(stream, 3)
@@ -175,7 +177,7 @@ def test_the_ports_are_listed_with_who_is_there(
 ) -> None:
     assert [port["path"] for port in server.get("/devices")] == sorted(port.device for port in comports())
     listing = partial(find_devices, list_ports=lambda: [usb(sensor.port)])
-    monkeypatch.setattr(app.api.sensor, "find_devices", listing)
+    monkeypatch.setattr(lidarcore_app.web.routes.sensor, "find_devices", listing)
     (free,) = server.get("/devices")
     serial = free.pop("serial")
     assert free == {
@@ -196,9 +198,11 @@ def test_without_being_told_the_connected_sensor_is_taken(
     sensor: EmulatorProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     ports = [usb("/dev/ttyUSB98"), usb(sensor.port)]
-    monkeypatch.setattr(app.live, "find_devices", partial(find_devices, list_ports=lambda: ports))
+    monkeypatch.setattr(
+        lidarcore_app.sources.live, "find_devices", partial(find_devices, list_ports=lambda: ports)
+    )
     source, said = connected_or_emulated(DeviceOptions(), Taps())
     source.close()
     assert source.kind == "device"
     assert sum("/dev/ttyUSB98" in sentence for sentence in said) == len(said) - 1 == 1
-    assert said[-1] == f"RPLIDAR S1, serial {source.device()['serial']}, at {sensor.port} plays."
+    assert said[-1] == f"Playing RPLIDAR S1, serial {source.device().serial}, at {sensor.port}."

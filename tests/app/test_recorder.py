@@ -2,16 +2,18 @@
 
 import threading
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+from captures import read_capture
+from lidarcore_app.errors import ConflictError
+from lidarcore_app.jobs.recorder import AsyncRecorder
+from lidarcore_app.jobs.spooler import Spooler
 from waiting import PATIENCE, wait_until
 
-from app.recorder import AsyncRecorder, RecorderBusyError
-from app.spooler import Spooler
 from lidarcore import RecordingError, extract, open_recording
-from lidarcore.rplidar.capture import Stream, read_capture
+from lidarcore.rplidar.capture import Stream
 from lidarcore.simulation import SimulatedSensor, furnished_room
 
 
@@ -38,7 +40,7 @@ def test_scans_are_recorded_from_start_to_stop(recorder, tmp_path, scans):
     read = list(open_recording(tmp_path / "a.mcap"))
     assert [scan.stamp for scan in read] == [scan.stamp for scan in scans[1:11]]
     size = (tmp_path / "a.mcap").stat().st_size
-    assert status == {
+    assert asdict(status) == {
         "state": "idle",
         "name": "a.mcap",
         "raw": False,
@@ -52,16 +54,16 @@ def test_scans_are_recorded_from_start_to_stop(recorder, tmp_path, scans):
 
 
 def test_the_status_counts_while_recording(recorder, tmp_path, scans):
-    assert recorder.status["state"] == "idle"
-    assert recorder.status["name"] is None
+    assert recorder.status.state == "idle"
+    assert recorder.status.name is None
     recorder.start(tmp_path / "a.mcap")
-    assert recorder.status["state"] == "recording"
+    assert recorder.status.state == "recording"
     for scan in scans[:3]:
         recorder.put(scan)
-    wait_until(lambda: recorder.status["size"] > 0)
-    assert recorder.status["size"] == (tmp_path / "a.mcap").stat().st_size
-    assert recorder.status["scans"] == 3
-    assert recorder.status["rate"] > 0
+    wait_until(lambda: recorder.status.size > 0)
+    assert recorder.status.size == (tmp_path / "a.mcap").stat().st_size
+    assert recorder.status.scans == 3
+    assert recorder.status.rate > 0
     assert [scan.stamp for scan in open_recording(tmp_path / "a.mcap")] == [scan.stamp for scan in scans[:3]]
 
 
@@ -74,13 +76,13 @@ def test_the_bytes_of_the_port_are_captured_beside(recorder, tmp_path, scans):
     status = recorder.stop()
     recorder.tap("in", 3.0, b"late")
     assert list(read_capture(tmp_path / "a.rplidar")) == pieces
-    assert status["raw"]
-    assert status["size"] == sum((tmp_path / name).stat().st_size for name in ("a.mcap", "a.rplidar"))
+    assert status.raw
+    assert status.size == sum((tmp_path / name).stat().st_size for name in ("a.mcap", "a.rplidar"))
 
 
 def test_one_recording_at_a_time(recorder, tmp_path):
     recorder.start(tmp_path / "a.mcap")
-    with pytest.raises(RecorderBusyError, match=r"a\.mcap is being recorded: stop that first"):
+    with pytest.raises(ConflictError, match=r"a\.mcap is being recorded: stop that first"):
         recorder.start(tmp_path / "b.mcap")
     assert not (tmp_path / "b.mcap").exists()
 
@@ -91,14 +93,14 @@ def test_nothing_starts_if_one_of_the_files_exists(recorder, tmp_path, scans, ta
     with pytest.raises(RecordingError, match="exists already"):
         recorder.start(tmp_path / "a.mcap", raw=tmp_path / "a.rplidar")
     recorder.put(scans[0])
-    assert recorder.status["state"] == "idle"
+    assert recorder.status.state == "idle"
     assert [path.name for path in tmp_path.iterdir()] == [taken]
     assert (tmp_path / taken).read_text() == "precious"
 
 
 def test_a_recording_without_a_scan_leaves_nothing(recorder, tmp_path):
     recorder.start(tmp_path / "a.mcap", raw=tmp_path / "a.rplidar")
-    assert recorder.stop()["scans"] == 0
+    assert recorder.stop().scans == 0
     assert list(tmp_path.iterdir()) == []
 
 
@@ -106,14 +108,14 @@ def test_one_bad_scan_ends_the_recording_with_its_reason_and_keeps_the_rest(reco
     recorder.start(tmp_path / "a.mcap")
     recorder.put(scans[0])
     recorder.put(replace(scans[1], stamp=1e12))
-    wait_until(lambda: recorder.status["state"] == "failed")
-    assert "32 bits" in recorder.status["error"]
+    wait_until(lambda: recorder.status.state == "failed")
+    assert "32 bits" in recorder.status.error
     recorder.put(scans[2])
     recorder.stop()
     (read,) = open_recording(tmp_path / "a.mcap")
     np.testing.assert_array_equal(read.bearings, scans[0].bearings)
     recorder.start(tmp_path / "b.mcap")
-    assert recorder.status["error"] is None
+    assert recorder.status.error is None
 
 
 def test_many_threads_may_use_it_at_once(recorder, tmp_path, scans):
@@ -126,8 +128,8 @@ def test_many_threads_may_use_it_at_once(recorder, tmp_path, scans):
     for thread in busy:
         thread.join(PATIENCE)
     status = recorder.stop()
-    assert status["state"] == "idle"
-    assert len(list(open_recording(tmp_path / "a.mcap"))) == status["scans"]
+    assert status.state == "idle"
+    assert len(list(open_recording(tmp_path / "a.mcap"))) == status.scans
 
 
 class SlowDisk:

@@ -2,21 +2,19 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_allclose
-
-from app.colours import METHOD_COLOURS, categorical, method_rgb, rgb, turbo, untoned
-from app.shapes import (
+from lidarcore_app.scene.colours import categorical, rgb, turbo, untoned
+from lidarcore_app.scene.palette import METHOD_STYLES, method_rgb
+from lidarcore_app.scene.shapes import (
     DISC_FACES,
     DISC_VERTICES,
     about_z,
-    axis_labels,
     beams_between,
     ellipses,
     lift,
-    nice_step,
     polylines,
-    text,
 )
+from numpy.testing import assert_allclose
+
 from lidarcore import FITTERS, Scan
 
 ACES_IN = [[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]]
@@ -46,8 +44,7 @@ def test_methods_are_told_apart_in_the_scene(theme: str) -> None:
 
 
 def test_every_method_has_a_colour_of_its_own() -> None:
-    assert METHOD_COLOURS.keys() == FITTERS.keys()
-    assert len(set(METHOD_COLOURS.values())) == len(FITTERS)
+    assert METHOD_STYLES.keys() == FITTERS.keys()
     assert rgb("#0102ff") == (1, 2, 255)
 
 
@@ -96,19 +93,8 @@ def test_beams_between_two_go_along_the_ring_and_leave_out_missing_ones() -> Non
     assert beams_between(scan, 3, 3).tolist() == [3]
 
 
-def test_strokes_and_labels_are_where_they_belong() -> None:
+def test_polylines_are_taken_apart_and_lifted() -> None:
     square = np.array([[[0, 0], [1, 0], [1, 1], [0, 0]]], float)
     assert polylines(square).tolist() == [[[0, 0], [1, 0]], [[1, 0], [1, 1]], [[1, 1], [0, 0]]]
     assert lift(square, 2.0).dtype == np.float32
     assert (lift(square, 2.0)[..., 2] == 2).all()
-    one = text("1", (5, 6), 4.0)
-    assert one.reshape(-1, 2).min(axis=0).tolist() == [5, 6]
-    assert one.reshape(-1, 2).max(axis=0).tolist() == [6, 10]
-    assert not {str(digit) for digit in range(10)} - {c for c in "0123456789" if len(text(c, (0, 0), 1))}
-    labels = axis_labels(6.0, 1).reshape(-1, 2)
-    assert np.abs(labels).max() < 7
-
-
-@pytest.mark.parametrize(("reach", "step"), [(1, 1), (8, 1), (8.1, 2), (16.5, 5), (60, 10), (300, 50)])
-def test_labels_are_at_whole_metres_and_not_too_many(reach: float, step: int) -> None:
-    assert nice_step(reach) == step

@@ -3,12 +3,12 @@
 import time
 from itertools import islice, pairwise
 
+import lidarcore_app.sources.history
 import numpy as np
 import pytest
+from lidarcore_app.sources.simulated import SimulationSource
 from waiting import wait_until
 
-import app.history
-from app.simulated import SimulationSource
 from lidarcore import Scan
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
@@ -42,7 +42,7 @@ def test_scans_are_those_of_the_robot_at_its_pace_in_unix_time() -> None:
 
 
 def test_scans_are_numbered_and_the_last_ones_can_be_shown_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(app.history, "HISTORY", 6)
+    monkeypatch.setattr(lidarcore_app.sources.history, "HISTORY", 6)
     told: list[Scan] = []
     source = SimulationSource(SETTINGS, told.append)
     played(source, 12)

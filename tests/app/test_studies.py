@@ -11,12 +11,11 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
+from lidarcore_app.jobs.study_process import parts_done
+from lidarcore_app.jobs.study_reports import MOST
 from processes import ENVIRONMENT, Serving
 from serving import ROOT, Json, Server, assert_problem, write_room
 from waiting import wait_until
-
-from app.cli_progress import read
-from app.study_reports import MOST
 
 SHORT = {"trials": 1000, "noise": "settings"}
 LONG = {"trials": 20_000_000}
@@ -34,7 +33,7 @@ def running(of: int = os.getpid()) -> list[psutil.Process]:
 
 
 def finished(server: Server) -> Json:
-    wait_until(lambda: server.get("/studies")["run"]["state"] != "running", "the study has ended", 120)
+    wait_until(lambda: server.get("/studies")["run"]["state"] != "running", "the study has ended", 240)
     return server.get("/studies")["run"]
 
 
@@ -224,11 +223,11 @@ def command(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
         f"--output={tmp_path / 'out.html'}",
     ]
     with subprocess.Popen(
-        [sys.executable, "-m", "app.cli", *arguments, "--progress"],
+        [sys.executable, "-m", "lidarcore_app.cli.main", *arguments, "--progress"],
         cwd=ROOT, env=ENVIRONMENT, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         assert process.stderr is not None
-        assert read(process.stderr.readline()) == (0, 480)
+        assert parts_done(process.stderr.readline()) == (0, 480)
         wait_until(lambda: len(workers_of(process.pid)) == 2, "its workers run")
         yield process
         process.kill()
@@ -268,7 +267,7 @@ def test_workers_end_when_their_parent_is_killed(command: subprocess.Popen[str])
     ],
 )
 def test_only_lines_of_progress_are_taken_for_it(line: str, parts: tuple[int, int] | None) -> None:
-    assert read(line) == parts
+    assert parts_done(line) == parts
 
 
 @pytest.mark.parametrize("study", ["cwlf", "wctls"])
@@ -282,12 +281,12 @@ def test_the_parts_told_go_up_to_all(study: str, tmp_path: Path, room: Path) -> 
         "--workers=1",
     ]
     with subprocess.Popen(
-        [sys.executable, "-m", "app.cli", *arguments, "--progress"],
+        [sys.executable, "-m", "lidarcore_app.cli.main", *arguments, "--progress"],
         cwd=ROOT, env=ENVIRONMENT, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         assert process.stderr is not None
         said = process.stderr.read()
         assert process.wait(60) == 0
     assert re.fullmatch(r"(progress \d+ \d+\n)+", said)
-    done, total = read(said.splitlines()[-1])
+    done, total = parts_done(said.splitlines()[-1])
     assert done == total

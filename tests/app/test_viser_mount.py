@@ -18,9 +18,14 @@ from waiting import PATIENCE
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
-NODES = {"/grid", "/labels", "/body/points", "/body/segments", "/body/corners", "/body/sensor", "/body/selection"} | {
-    "/body/ellipses/fill", "/body/ellipses/outline", "/body/rejected/points", "/body/rejected/crosses",
-}  # fmt: skip
+NODES = {
+    "/body/points",
+    "/body/segments",
+    "/body/gaps",
+    "/body/rejected/points",
+    "/trails/estimated",
+    "/occupancy",
+}
 
 
 class Viewer:
@@ -96,8 +101,8 @@ def test_a_client_gets_the_whole_scene_and_then_every_frame(server: Server, room
         shown = viewer.array("/body/points", "points").reshape(-1, 3)
         np.testing.assert_allclose(shown[:, :2], points, atol=1e-4)
         assert viewer.nodes["/body/points"]["precision"] == "float32"
-        discs = viewer.array("/body/corners", "batched_positions").reshape(-1, 3)[:, :2]
-        assert np.linalg.norm(discs[:, None] - CORNERS, axis=2).min(axis=1).max() < 0.01
+        ends = viewer.array("/body/segments", "points").reshape(-1, 3)[:, :2]
+        assert np.linalg.norm(ends[:, None] - CORNERS, axis=2).min(axis=0).max() < 0.1
         server.change("POST", "/source/step", {"by": 1})
         viewer.until(lambda: not np.array_equal(viewer.array("/body/points", "points").reshape(-1, 3), shown))
 
@@ -106,43 +111,28 @@ def test_compare_mode_draws_every_method_in_its_colour(server: Server, room) -> 
     with viewing(server) as viewer:
         server.change("PATCH", "/settings", {"view": {"compare": True, "methods": ["cwlf", "wctls"]}})
         server.play(room, paused=True)
-        viewer.until(
-            lambda: (
-                "/body/ellipses/fill" in viewer.nodes
-                and len(viewer.array("/body/ellipses/fill", "batched_positions")) == 36
-            )
-        )
-        viewer.until(lambda: len(viewer.array("/body/ellipses/fill", "batched_colors", "u1")) == 36)
-        colours = viewer.array("/body/ellipses/fill", "batched_colors", "u1").reshape(-1, 3)
-        assert len(np.unique(colours, axis=0)) == 3
+        viewer.until(lambda: "/body/segments" in viewer.nodes)
         viewer.until(lambda: len(viewer.array("/body/segments", "points")) == 12 * 6)
+        viewer.until(lambda: len(viewer.array("/body/segments", "colors", "u1")) == 12 * 6)
+        colours = viewer.array("/body/segments", "colors", "u1").reshape(-1, 3)
+        assert len(np.unique(colours, axis=0)) == 3
 
 
-def test_layers_theme_and_selection_reach_the_scene(server: Server, room) -> None:
-    frame = server.play(room, paused=True)
+def test_layers_and_theme_reach_the_scene(server: Server, room) -> None:
+    server.play(room, paused=True)
     with viewing(server) as viewer:
         viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
-        assert not viewer.nodes["/body/selection"]["visible"]
-        server.change("PUT", "/selection", {"corner": frame["corners"][0]["id"]})
-        corner = frame["corners"][0]["by_method"]["ml"]
-
-        def is_ringed() -> bool:
-            ring = viewer.array("/body/selection", "points").reshape(-1, 3)[:, :2]
-            around = len(ring) > 0 and np.allclose(ring.mean(axis=0), [corner["x"], corner["y"]], atol=0.01)
-            return viewer.nodes["/body/selection"]["visible"] and around
-
-        viewer.until(is_ringed)
         server.change(
-            "PATCH", "/settings", {"view": {"layers": {"points": False, "grid": False}, "theme": "light"}}
+            "PATCH", "/settings", {"view": {"layers": {"points": False, "segments": False}, "theme": "light"}}
         )
         viewer.until(
-            lambda: not (viewer.nodes["/body/points"]["visible"] or viewer.nodes["/grid"]["visible"])
+            lambda: not (viewer.nodes["/body/points"]["visible"] or viewer.nodes["/body/segments"]["visible"])
         )
         viewer.until(lambda: "ThemeConfigurationMessage" in viewer.types)
 
 
 def test_a_localized_sensor_and_what_it_sees_are_drawn_where_it_is(server: Server, room) -> None:
-    server.change("PATCH", "/settings", {"navigation": {"mode": "slam"}})
+    server.change("PATCH", "/settings", {"navigation": {"mode": "slam", "method": "landmarks"}})
     server.play(room, paused=True)
     server.change(
         "POST",
@@ -162,28 +152,7 @@ def test_a_localized_sensor_and_what_it_sees_are_drawn_where_it_is(server: Serve
             wanted = np.stack([10 - y, -5 + x], -1)
             return shown.shape == wanted.shape and np.allclose(shown, wanted, rtol=0, atol=0.15)
 
-        viewer.until(lambda: viewer.array("/body/sensor", "points").reshape(-1, 3)[:, 0].min() > 8)
         viewer.until(are_where_it_is)
-
-
-def test_a_click_selects_the_nearest_corner(server: Server, room) -> None:
-    frame = server.play(room, paused=True)
-    with server.stream() as stream, viewing(server) as viewer:
-        viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
-        look_from_above(viewer)
-        for corner in frame["corners"]:
-            x, y = (corner["by_method"]["ml"][axis] for axis in "xy")
-            click(viewer, (x + 0.1, y - 0.1, 50.0), (0.0, 0.0, -1.0))
-            stream.state(lambda s, wanted=corner["id"]: s["selection"]["corner"] == wanted)
-        for direction in ((0.0, 0.0, 0.0), (0.0, 0.0, float("nan")), (1.0, 0.0, 0.0)):
-            click(viewer, (0.0, 0.0, 50.0), direction)
-        click(viewer, (float("inf"), 0.0, 50.0), (0.0, 0.0, -1.0))
-        click(viewer, (3.5, 2.2, 50.0), (0.0, 0.0, -1.0))  # once this one has arrived, the others have
-        nearest = min(
-            frame["corners"],
-            key=lambda c: abs(c["by_method"]["ml"]["x"] - 3.5) + abs(c["by_method"]["ml"]["y"] - 2.2),
-        )
-        stream.state(lambda s: s["selection"]["corner"] == nearest["id"])
 
 
 def look_from_above(viewer: Viewer) -> None:
@@ -194,20 +163,14 @@ def look_from_above(viewer: Viewer) -> None:
     )  # fmt: skip
 
 
-def click(viewer: Viewer, origin: tuple, direction: tuple) -> None:
-    viewer.send(
-        type="SceneNodeClickMessage", name="/body/corners", instance_index=0, ray_origin=origin,
-        ray_direction=direction, screen_pos=(0.5, 0.5), modifier=None, owner="",
-    )  # fmt: skip
-
-
-def test_no_message_but_camera_and_click_gets_in(server: Server) -> None:
+def test_no_message_but_the_camera_gets_in(server: Server) -> None:
     """The share tunnel would call out, uploads would fill the memory, panels are for all: nothing of it happens."""
     viser_server = server.viser
     with viewing(server) as viewer:
         viewer.until(lambda: "ReplayDoneMessage" in viewer.types)
         look_from_above(viewer)
         viewer.send(type="ShareUrlRequest")
+        viewer.send(type="SceneNodeClickMessage", name="/body/points", instance_index=0)
         viewer.send(type="GuiUpdateMessage", uuid="x", updates={"value": 1})
         viewer.send(
             type="FileTransferStartUpload", source_component_uuid="x", transfer_uuid="y", filename="f",
@@ -222,7 +185,7 @@ def test_no_message_but_camera_and_click_gets_in(server: Server) -> None:
 
 def test_a_broken_message_ends_only_the_client_that_sent_it(server: Server) -> None:
     with viewing(server) as good, viewing(server) as bad:
-        bad.send(type="SceneNodeClickMessage", nonsense=True)
+        bad.send(type="ViewerCameraMessage", nonsense=True)
         with pytest.raises(ConnectionClosed):
             bad.until(lambda: False)
         good.until(lambda: "ReplayDoneMessage" in good.types)

@@ -24,12 +24,22 @@ ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data"
 GOLF = DATA / "rplidar_csv_rooms" / "golf_room.csv.gz"
 HOKUYO = DATA / "ccny_hokuyo_rosbag1" / "demo.bag"
-CHROMIUM = "/usr/bin/chromium"
+CHROMIUM = "/usr/bin/chromium-headless-shell"
 FLAGS = [
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
 ]  # fmt: skip
 WASM_BINDING = "unsafe-eval"  # viser's client tries once at its start, is refused, and does without
+PIXEL_OF = """async ([kind, id]) => {
+  const [{ lookNow }, { worldOf }, { get }] = await Promise.all(
+    ["scene.js", "overlay/world.js", "store.js"].map((name) => import(`/static/js/${name}`)));
+  const world = worldOf(get("frame"), get("landmarks") ?? new Map());
+  return lookNow().toScreen(world[`${kind}s`].find((thing) => thing.id === id).at);
+}"""
+PIXEL_AT = """async (place) => {
+  const { lookNow } = await import("/static/js/scene.js");
+  return lookNow().toScreen(place);
+}"""
 expect.set_options(timeout=1e3 * PATIENCE)
 Pixels = NDArray[np.int64]
 
@@ -48,7 +58,15 @@ class Server:
 
     def launch(self) -> None:
         """Start it, and do not wait for it."""
-        command = [sys.executable, "-m", "app.cli", "serve", "--http-port", str(self.port), "--emulator"]
+        command = [
+            sys.executable,
+            "-m",
+            "lidarcore_app.cli.main",
+            "serve",
+            "--http-port",
+            str(self.port),
+            "--emulator",
+        ]
         self._process = subprocess.Popen([*command, "--recordings", str(self.folder)], cwd=ROOT)
 
     def _is_ready(self) -> bool:
@@ -199,6 +217,18 @@ class Visitor:
         """Fit the room in the view and wait until the camera has come to rest."""
         self.page.get_by_role("button", name="Fit the room in the view").click()
         self.still_picture(seconds=1.5)  # the scene looks every second whether the room is still in the view
+
+    def pixel_of(self, kind: str, id: int) -> tuple[float, float]:
+        """Where on the page a corner or landmark is drawn."""
+        x, y = self.page.evaluate(PIXEL_OF, [kind, id])
+        box = self.page.locator("#scene").bounding_box()
+        return box["x"] + x, box["y"] + y
+
+    def pixel_at(self, place: list[float]) -> tuple[float, float]:
+        """Where on the page a place [x, y] of the world, m, is."""
+        x, y = self.page.evaluate(PIXEL_AT, place)
+        box = self.page.locator("#scene").bounding_box()
+        return box["x"] + x, box["y"] + y
 
     def check(self) -> None:
         """Nothing went out of this machine, and nothing went wrong."""

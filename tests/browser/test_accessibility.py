@@ -1,6 +1,9 @@
 """Readable and usable: small screens, light and dark, and by those who do not see the page."""
 
+from collections import Counter
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 from browsing import Visitor
@@ -10,8 +13,17 @@ from waiting import wait_until
 PANELS = ("Corners", "Setup", "Map", "Plots", "Repeatability", "Source", "Rejected")
 MAPPED = {"view": {"compare": True}, "navigation": {"mode": "slam"}, "repeatability": {"running": True}}
 CONTROLS = {
-    "button", "checkbox", "combobox", "link", "radio", "slider", "spinbutton", "switch", "tab", "Iframe",
+    "button", "checkbox", "combobox", "link", "radio", "slider", "spinbutton", "switch", "tab", "textbox",
+    "DisclosureTriangle", "Iframe",
 }  # fmt: skip
+
+AXE = Path(__file__).parent / "vendor/axe-core/axe.min.js"
+LOOK_FOR_VIOLATIONS = """async () => {
+  const runOnly = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"];
+  const { violations } = await axe.run(document, { runOnly, iframes: false });
+  return violations.map(({ id, nodes }) => [id, ...nodes.map(({ html }) => html)]);
+}"""
+UNFOLD = "() => document.querySelectorAll('details').forEach((details) => details.open = true)"
 
 # Effective colours of every visible text: [text, colour, background] with alpha blended over what lies below.
 TEXT_COLOURS = """() => {
@@ -63,6 +75,7 @@ def contrast(a: list[float], b: list[float]) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
+@pytest.mark.scene
 def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     phone.server.patch("settings", MAPPED)
     expect(phone.page.locator("#corner-table thead .group")).to_have_count(6)
@@ -104,6 +117,7 @@ def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], t
         assert weak == [], panel
 
 
+@pytest.mark.scene
 def test_theme_button_turns_the_page_and_the_scene(visit: Callable[..., Visitor]) -> None:
     visitor = visit(theme="dark").open()
     visitor.server.pause()
@@ -113,20 +127,55 @@ def test_theme_button_turns_the_page_and_the_scene(visit: Callable[..., Visitor]
     wait_until(lambda: visitor.picture().mean() > 200, "the scene is light")
 
 
-def test_every_control_has_a_name(visitor: Visitor) -> None:
+def controls(nodes: list[dict[str, Any]]) -> list[tuple[str, str]]:
+    """Role and name of every control in an accessibility tree; a radio button is named with its group."""
+    by_id = {node["nodeId"]: node for node in nodes}
+
+    def name(node: dict[str, Any]) -> str:
+        return node.get("name", {}).get("value", "").strip()
+
+    def group(node: dict[str, Any]) -> str:
+        while node["role"]["value"] not in ("group", "radiogroup"):
+            node = by_id[node["parentId"]]
+        return name(node)
+
+    shown = [(node["role"]["value"], node) for node in nodes if not node["ignored"]]
+    return [
+        (role, f"{group(node)}: {name(node)}" if role == "radio" and name(node) else name(node))
+        for role, node in shown
+        if role in CONTROLS
+    ]
+
+
+def test_every_control_has_a_name_of_its_own(visitor: Visitor) -> None:
     visitor.server.patch("settings", MAPPED)
+    visitor.await_frame(visitor.server.pause())
+    visitor.page.keyboard.press("ArrowDown")
+    expect(visitor.page.get_by_role("complementary", name="Inspector")).to_be_visible()
     session = visitor.page.context.new_cdp_session(visitor.page)
     for panel in PANELS[1:]:
         visitor.page.get_by_role("tab", name=panel).click()
-        nodes = session.send("Accessibility.getFullAXTree")["nodes"]
-        found = [
-            (node["role"]["value"], node.get("name", {}).get("value", ""))
-            for node in nodes
-            if not node["ignored"]
-        ]
-        controls = [(role, name) for role, name in found if role in CONTROLS]
-        assert len(controls) > 12
-        assert [role for role, name in controls if not name.strip()] == [], panel
+        visitor.page.evaluate(UNFOLD)
+        found = controls(session.send("Accessibility.getFullAXTree")["nodes"])
+        assert len(found) > 12
+        assert [role for role, name in found if not name] == [], panel
+        count = Counter(name for _, name in found)
+        assert [name for name in count if count[name] > 1] == [], panel
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_axe_finds_nothing_on_any_tab(visit: Callable[..., Visitor], theme: str) -> None:
+    visitor = visit(1400, 900, theme=theme, reduced_motion="reduce").open()
+    expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)
+    visitor.server.patch("settings", MAPPED)
+    visitor.await_frame(visitor.server.pause())
+    visitor.page.keyboard.press("ArrowDown")
+    expect(visitor.page.get_by_role("complementary", name="Inspector")).to_be_visible()
+    visitor.page.evaluate(AXE.read_text())
+    for panel in PANELS[1:]:
+        visitor.page.get_by_role("tab", name=panel).click()
+        violations = visitor.page.evaluate(LOOK_FOR_VIOLATIONS)
+        assert violations == [], panel
 
 
 def test_page_has_landmarks_and_a_table_that_can_be_read_out(visitor: Visitor) -> None:

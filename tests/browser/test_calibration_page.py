@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ PROFILE = {"extraction": {"noise": {"sigma_range": 0.031, "sigma_bearing": 0.001
 def sensor() -> Iterator[EmulatorProcess]:
     """A sensor that errs as it is told to, with nobody about who would hide a wall."""
     options = {"people": 0, "sigma_range": SIGMA_RANGE, "sigma_bearing": SIGMA_BEARING}
+    options |= {"range_growth": 0, "unevenness": 0}
     with EmulatorProcess(**options) as emulator:
         yield emulator
 
@@ -40,6 +42,16 @@ def noise(server: Server) -> dict[str, float]:
     return server.get("settings")["extraction"]["noise"]
 
 
+def kept(server: Server, **parts: float) -> dict[str, float]:
+    """The noise that is set, after these parts of it were."""
+    return server.patch("settings", {"extraction": {"noise": parts}})["extraction"]["noise"]
+
+
+def used(found: dict[str, float | None], before: dict[str, float]) -> dict[str, float]:
+    """What `Use` should set: what was found, and what was set before where nothing could be."""
+    return before | {name: value for name, value in found.items() if value is not None}
+
+
 def profile(visitor: Visitor, name: str) -> Locator:
     return visitor.page.locator("#profile-list li", has_text=name)
 
@@ -54,6 +66,7 @@ def test_noise_of_a_sensor_is_found_used_and_kept_as_a_profile(
     server, page = visitor.server, visitor.page
     server.api.put("source", json={"kind": "device", "port": sensor.port}).raise_for_status()
     wait_until(lambda: server.get("source")["device"]["state"] == "streaming", "the sensor streams")
+    before = kept(server, systematic=0.0021)  # what a sensor at rest never sees
     page.get_by_label("Scans", exact=True).fill("50")
     page.get_by_role("button", name="Calibrate").click()
     expect(page.get_by_role("progressbar", name="Scans collected")).to_be_visible()
@@ -81,7 +94,8 @@ def test_noise_of_a_sensor_is_found_used_and_kept_as_a_profile(
     page.get_by_role("button", name="Save as profile").click()
     expect(profile(visitor, "hall")).to_be_visible()
     page.get_by_role("button", name="Use", exact=True).click()
-    wait_until(lambda: noise(server) == found["noise"], "it is used")
+    wanted = used(found["noise"], before)
+    wait_until(lambda: noise(server) == wanted, "it is used")
     expect(profile(visitor, "hall")).to_contain_text("in use")
 
     page.reload()
@@ -90,15 +104,19 @@ def test_noise_of_a_sensor_is_found_used_and_kept_as_a_profile(
     server.patch("settings", {"extraction": {"noise": None}})
     expect(profile(visitor, "hall")).not_to_contain_text("in use")
     page.get_by_role("button", name="hall", exact=False).first.click()
-    wait_until(lambda: noise(server) == found["noise"], "the profile is chosen")
+    wait_until(lambda: noise(server) == wanted, "the profile is chosen")
     with page.expect_download() as download:
         page.get_by_role("link", name="Export profile hall").click()
-    assert json.loads(Path(download.value.path()).read_text()) == {"extraction": {"noise": found["noise"]}}
+    exported = json.loads(Path(download.value.path()).read_text())
+    assert exported["extraction"]["noise"] == wanted
     page.get_by_role("button", name="Delete profile hall").click()
     page.get_by_role("button", name="Delete", exact=True).click()
     expect(profile(visitor, "hall")).to_have_count(0)
     assert server.get("profiles")["profiles"] == []
-    assert noise(server) == found["noise"]
+    assert noise(server) == wanted
+    page.get_by_role("button", name="RPLIDAR A1 or A2").click()
+    wait_until(lambda: noise(server)["unevenness_length"] == 0.12, "the usual noise of an A1 is used")
+    expect(profile(visitor, "RPLIDAR A1 or A2")).to_contain_text("14 places in three recordings")
 
 
 def test_what_cannot_be_told_is_said_and_what_is_set_stays(visitor: Visitor, tmp_path: Path) -> None:
@@ -112,18 +130,18 @@ def test_what_cannot_be_told_is_said_and_what_is_set_stays(visitor: Visitor, tmp
     np.savez(file, ranges=ranges, bearings=scans[0].bearings, stamps=0.01 * np.arange(len(scans)))
     server.api.put("recordings/narrow.npz", content=file.read_bytes()).raise_for_status()
     server.api.put("source", json={"kind": "recording", "name": "narrow.npz"}).raise_for_status()
-    server.patch("settings", {"extraction": {"noise": {"sigma_bearing": 0.0042}}})
+    before = kept(server, sigma_bearing=0.0042, systematic=0.0021)
     page.get_by_role("button", name="Calibrate").click()
     facts = page.locator("#calibration-result dl")
     expect(facts).to_be_visible(timeout=120_000)
-    expect(facts).to_contain_text(re.compile(r"Bearing noise, 1σ\s*cannot be told, at most [\d.]+.°"))
-    expect(facts).to_contain_text(re.compile(r"Range bias\s*cannot be told"))
-    expect(page.locator("#calibration-result")).to_contain_text("the one that is set should stay")
+    expect(facts).to_contain_text(re.compile(r"Bearing noise, 1σ\s*unknown, at most [\d.]+.°"))
+    expect(facts).to_contain_text(re.compile(r"Range bias\s*unknown"))
+    expect(page.locator("#calibration-result")).to_contain_text("keep the current setting")
     page.get_by_role("button", name="Use", exact=True).click()
     expect(page.get_by_role("button", name="In use", exact=True)).to_be_disabled()
     found = server.get("calibration")["result"]["noise"]
     assert found["sigma_bearing"] is None
-    assert noise(server) == found | {"sigma_bearing": 0.0042}
+    assert noise(server) == used(found, before)
 
 
 def test_a_second_start_is_refused_and_shows_the_one_that_runs(visitor: Visitor) -> None:
@@ -161,15 +179,16 @@ def test_files_are_imported_replaced_on_demand_or_refused(visitor: Visitor, tmp_
     bad.write_text('{"view": {}}')
     page.get_by_label("Profile to import").set_input_files(good)
     profile(visitor, "lab").get_by_role("button", name="lab", exact=False).first.click()
-    wait_until(lambda: noise(server) == PROFILE["extraction"]["noise"], "it is used")
+    wanted = asdict(SensorNoise(**PROFILE["extraction"]["noise"]))
+    wait_until(lambda: noise(server) == wanted, "it is used")
     page.get_by_label("Profile to import").set_input_files(good)
     page.get_by_role("button", name="Replace it").click()
     page.get_by_label("Profile to import").set_input_files(bad)
     toast = page.locator(".toast.error")
-    expect(toast).to_contain_text("The file is no profile: /extraction: Field required; ")
+    expect(toast).to_contain_text("The file is not a profile: extraction: Field required; ")
     bad.write_text("no JSON")
     page.get_by_label("Profile to import").set_input_files(bad)
-    expect(toast.last).to_contain_text(re.compile("The file is no profile: .*JSON"))
+    expect(toast.last).to_contain_text(re.compile("The file is not a profile: .*JSON"))
     assert [entry["name"] for entry in server.get("profiles")["profiles"]] == ["lab"]
 
 

@@ -22,9 +22,10 @@ def shown_parameters(visitor: Visitor) -> set[str]:
 
 
 def found(server: Server) -> int:
-    return len(server.get("frame")["clusters"])
+    return len(server.get("frame")["clusters"] or ())
 
 
+@pytest.mark.scene
 def test_method_is_switched_live_and_shows_only_what_it_uses(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     page.get_by_role("switch", name="Show them in the scene").first.click()
@@ -57,6 +58,7 @@ def test_number_of_clusters_is_chosen_by_the_page_or_for_every_scan(visitor: Vis
     wait_until(lambda: "k_max" in shown_parameters(visitor), "there is something to choose")
 
 
+@pytest.mark.scene
 @pytest.mark.real_data
 def test_clusters_are_drawn_where_they_are_shown(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page

@@ -5,9 +5,8 @@ from collections.abc import Callable
 import httpx
 import pytest
 from browsing import Server, Visitor
+from lidarcore_app.web.security import HEADERS
 from playwright.sync_api import expect
-
-from app.security import HEADERS
 
 OVERHANGING = """() => [...document.querySelectorAll("p, li, svg, h1, h2, h3, math, figcaption")]
   .filter((node) => !node.closest(".wide, svg svg, math math"))

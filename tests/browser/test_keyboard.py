@@ -12,6 +12,13 @@ def view(server: Server) -> dict:
     return server.get("settings")["view"]
 
 
+OWN = {
+    "g": lambda view: not view["layers"]["grid"],
+    "+": lambda view: view["ellipse_scale"] > 10,
+    "r": lambda view: view["rotate"],
+}
+
+
 def extraction(server: Server) -> dict:
     return server.get("settings")["extraction"]
 
@@ -25,12 +32,9 @@ def extraction(server: Server) -> dict:
         ("Shift+Digit3", lambda server: "utls" not in view(server)["methods"]),
         ("c", lambda server: view(server)["compare"]),
         ("v", lambda server: extraction(server)["covariance"] == "published"),
-        ("g", lambda server: not view(server)["layers"]["grid"]),
         ("x", lambda server: view(server)["layers"]["rejected"]),
         ("k", lambda server: view(server)["layers"]["clusters"]),
         ("m", lambda server: server.get("settings")["navigation"]["mode"] == "slam"),
-        ("+", lambda server: view(server)["ellipse_scale"] > 10),
-        ("r", lambda server: view(server)["rotate"]),
         ("t", lambda server: view(server)["theme"] == "light"),
         ("l", lambda server: not server.get("source")["loop"]),
         ("w", lambda server: server.get("recorder")["state"] == "recording"),
@@ -40,6 +44,14 @@ def test_key_does_what_the_help_says(keys: Visitor, key: str, holds: Callable[[S
     assert not holds(keys.server)
     keys.page.keyboard.press(key)
     wait_until(lambda: holds(keys.server), f"{key} has worked")
+
+
+@pytest.mark.parametrize("key", OWN)
+def test_key_changes_the_view_of_this_browser_only(keys: Visitor, key: str) -> None:
+    before = view(keys.server)
+    keys.page.keyboard.press(key)
+    wait_until(lambda: OWN[key](keys.knows("settings")["view"]), f"{key} has worked")
+    assert view(keys.server) == before
 
 
 def test_arrow_selects_a_corner(keys: Visitor) -> None:
@@ -61,6 +73,7 @@ def keys_page(browser: Browser, running: Server) -> Iterator[Visitor]:
 @pytest.fixture
 def keys(keys_page: Visitor) -> Visitor:
     keys_page.server.reset()
+    keys_page.page.evaluate("import('/static/js/actions.js').then(({ settings }) => settings.forgetOwn())")
     return keys_page.catch_up()
 
 
@@ -72,14 +85,14 @@ def test_question_mark_opens_the_help(keys: Visitor) -> None:
     keys.page.keyboard.press("Escape")
     expect(dialog).to_be_hidden()
     keys.page.keyboard.press("g")
-    wait_until(lambda: not view(keys.server)["layers"]["grid"], "once it is closed, keys work again")
+    wait_until(lambda: OWN["g"](keys.knows("settings")["view"]), "once it is closed, keys work again")
     assert not view(keys.server)["compare"], "keys do nothing behind a dialog"
 
 
+@pytest.mark.scene
 def test_keys_pressed_in_the_scene_work_too(keys: Visitor) -> None:
     box = keys.page.locator("#scene").bounding_box()
     keys.page.mouse.click(box["x"] + box["width"] / 2, box["y"] + 30)
-    wait_until(lambda: keys.page.evaluate("document.activeElement.id") == "scene", "the scene has the focus")
     keys.page.keyboard.press("c")
     wait_until(lambda: view(keys.server)["compare"], "the page got the key")
 

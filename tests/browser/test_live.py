@@ -59,9 +59,9 @@ class Watched:
         self.wait_for(lambda frame: frame["source"]["kind"] != "recording", "live frames arrive")
 
     def expect_cut_off(self) -> None:
-        expect(self.page.locator("#source-state")).to_contain_text("Reconnecting by itself")
+        expect(self.page.locator("#source-state")).to_contain_text("Disconnected, reconnects")
         expect(self.page.locator("#live")).to_have_text("No signal")
-        expect(self.page.locator("#banner")).to_contain_text("once the lidar is back")
+        expect(self.page.locator("#banner")).to_contain_text("when the lidar is back")
         for figure in ("readout-rate", "readout-complete", "device-rate", "device-completeness", "dial-text"):
             expect(self.page.locator(f"#{figure}")).to_have_text("\u2013")
         port = self.server.get("source")["device"]["port"]
@@ -109,8 +109,15 @@ def test_source_is_switched_while_it_runs(live: Watched) -> None:
 
 
 def test_demo_that_comes_along_plays_and_cannot_be_deleted(live: Watched) -> None:
-    (demo,) = (entry["name"] for entry in live.server.get("recordings")["recordings"] if entry.get("builtin"))
-    live.press("Recording")
+    demo, real = (
+        entry["name"] for entry in live.server.get("recordings")["recordings"] if entry.get("builtin")
+    )
+    live.page.get_by_role("button", name=re.compile(real)).first.click()
+    expect(live.page.locator("#readout-source")).to_have_text(real)
+    live.wait_for(
+        lambda frame: frame["source"]["index"] > 3 and frame["corners"], "it plays, and has corners"
+    )
+    live.page.get_by_role("button", name=re.compile(demo)).first.click()
     expect(live.page.locator("#readout-source")).to_have_text(demo)
     live.wait_for(
         lambda frame: frame["source"]["index"] > 3 and frame["corners"], "it plays, and has corners"
@@ -156,11 +163,11 @@ def test_faults_of_the_emulator_are_seen_in_the_page(live: Watched) -> None:
     live.press("Lose 5 %")
     frame = live.wait_for(lambda frame: frame["gaps"], "a sector is lost")
     assert 0 < frame["completeness"] < 1
-    expect(live.page.locator("#device-losses")).to_contain_text("Dropped, missing packets")
+    expect(live.page.locator("#device-losses")).to_contain_text("Missing packets")
     expect(live.page.locator("#dial-lost")).to_have_attribute("d", re.compile("M.*A"))
     expect(live.page.locator("#device-completeness")).not_to_have_text("100\u2009%")
     live.press("Flip bits in 2 %")
-    expect(live.page.locator("#device-losses")).to_contain_text("Dropped, damaged packets")
+    expect(live.page.locator("#device-losses")).to_contain_text("Damaged packets")
     live.press("No more faults")
     expect(live.page.locator("#device-completeness")).to_have_text("100\u2009%")
     expect(live.page.locator("#device-losses")).to_contain_text("nothing")
@@ -186,7 +193,7 @@ def test_refusal_is_told_in_plain_words_until_something_else_is_opened(visitor: 
     visitor.tolerated.append("404")
     page, message = visitor.page, visitor.page.locator(".toast.error")
     tried = (
-        "import('/static/js/session.js').then(({ open }) => open({ kind: 'device', port: '/dev/ttyUSB99' }))"
+        "import('/static/js/actions.js').then(({ open }) => open({ kind: 'device', port: '/dev/ttyUSB99' }))"
     )
     assert page.evaluate(tried) is False
     expect(message.locator("strong")).to_have_text("The device could not be opened")

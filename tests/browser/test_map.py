@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browsing import HOKUYO, Pixels, Server, Visitor, drawn
+from browsing import HOKUYO, Server, Visitor
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, expect
-from scipy import ndimage
 from waiting import wait_until
 
 FEW = 8  # landmarks that a furnished room has soon; with fewer than half of what is in view it is not recognized
@@ -30,7 +29,7 @@ def found_in(server: Server) -> str:
 
 def slam(server: Server) -> None:
     """A map of its own is built, and some landmarks of it are recognized."""
-    server.patch("settings", {"navigation": {"mode": "slam", "landmarks": "corners"}})
+    server.patch("settings", {"navigation": {"mode": "slam", "method": "landmarks", "landmarks": "corners"}})
     wait_until(lambda: recognized(server) >= FEW, "there are landmarks")
 
 
@@ -39,7 +38,7 @@ def map_recording(visitor: Visitor) -> dict:
     server = visitor.server
     server.patch("settings", {"view": None, "clusters": None, "navigation": None})
     server.show(HOKUYO, MAPPED[0])
-    server.patch("settings", {"navigation": {"mode": "slam"}})
+    server.patch("settings", {"navigation": {"mode": "slam", "method": "landmarks"}})
     for index in MAPPED:
         server.patch("source", {"index": index})
         wait_until(lambda index=index: is_mapped(server, index), f"scan {index} is mapped")
@@ -96,9 +95,10 @@ def number(text: str) -> float:
 def test_slam_is_switched_on_and_landmarks_appear(map_page: Visitor) -> None:
     page, server = map_page.page, map_page.server
     page.get_by_role("tab", name="Map").click()
-    expect(page.locator("#whereabouts")).to_be_hidden()
+    expect(page.locator("#pose-panel")).to_be_hidden()
+    page.locator("#navigation .segments label", has_text="Corners").first.click()
     page.locator("#navigation .segments label", has_text="SLAM").click()
-    expect(page.locator("#whereabouts-state")).to_have_text("Tracking")
+    expect(page.locator("#pose-panel-state")).to_have_text("Tracking")
     wait_until(lambda: len(row_texts(page)) >= FEW, "landmarks are listed")
     frame = map_page.await_frame(server.pause())
     listed: dict[str, list[str]] = {}
@@ -135,6 +135,7 @@ def test_without_a_map_there_is_nothing_to_save_or_clear(mapped: Visitor) -> Non
     expect(page.locator("#map-save a")).to_have_count(0)
 
 
+@pytest.mark.scene
 @pytest.mark.real_data
 def test_landmark_clicked_shows_its_covariance_and_history(mapped: Visitor) -> None:
     page, server = mapped.page, mapped.server
@@ -154,6 +155,7 @@ def test_landmark_clicked_shows_its_covariance_and_history(mapped: Visitor) -> N
     wait_until(lambda: server.get("selection")["landmark"] is None, "none is selected")
 
 
+@pytest.mark.scene
 def test_innovations_are_charted_with_the_band_they_should_lie_in(mapped: Visitor) -> None:
     page = mapped.page
     page.get_by_role("tab", name="Plots").click()
@@ -174,12 +176,13 @@ def test_innovations_are_charted_with_the_band_they_should_lie_in(mapped: Visito
     expect(figure).to_have_count(0)
 
 
+@pytest.mark.scene
 @pytest.mark.real_data
 def test_pose_is_set_by_dragging_in_the_scene(mapped: Visitor) -> None:
     page = mapped.page
     map_recording(mapped)
     mapped.fit()
-    to_world, _ = world_of_pixels(mapped)
+    to_world = world_of_pixels(mapped)
     box = page.locator("#scene").bounding_box()
     start, end = np.array([0.45, 0.5]), np.array([0.6, 0.35])
     pixels = [part * [box["width"], box["height"]] for part in (start, end)]
@@ -195,36 +198,18 @@ def test_pose_is_set_by_dragging_in_the_scene(mapped: Visitor) -> None:
     expect(page.locator("#place-hint")).to_be_hidden()
 
 
-def world_of_pixels(
-    visitor: Visitor,
-) -> tuple[Callable[[NDArray[np.float64]], NDArray[np.float64]], NDArray[np.float64]]:
-    """World (2,) m of a pixel of the scene, by the pixels (K, 2) where the corners of the frame are drawn."""
-    layers = visitor.server.get("settings")["view"]["layers"]
-    only = {name: name == "corners" for name in layers}
-    cover = visitor.page.add_style_tag(content=".legend, .dial, .scene-tools { visibility: hidden }")
-    frame = visitor.server.get("frame")
-    visitor.server.patch("settings", {"view": {"layers": only}})
-    wait_until(
-        lambda: len(markers(visitor.picture())) == len(frame["corners"]), "each corner is a marker of its own"
-    )
-    pixels = markers(visitor.still_picture())
-    cover.evaluate("style => style.remove()")
+def world_of_pixels(visitor: Visitor) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """World (2,) m of a pixel of the scene, by the pixels where the corners of the frame are drawn."""
+    frame, box = visitor.server.get("frame"), visitor.page.locator("#scene").bounding_box()
+    at = [visitor.pixel_of("corner", corner["id"]) for corner in frame["corners"]]
+    pixels = np.array(at) - [box["x"], box["y"]]
     pose, main = frame["localization"]["pose"], frame["fitter"]
     c, s = np.cos(pose["heading"]), np.sin(pose["heading"])
     seen = np.array([[corner["by_method"][main][axis] for axis in "xy"] for corner in frame["corners"]])
     world = seen @ np.array([[c, s], [-s, c]]) + [pose["x"], pose["y"]]
-    pixels, world = pixels[np.argsort(pixels[:, 0])], world[np.argsort(world[:, 0])]
     slope = np.ptp(world[:, 0]) / np.ptp(pixels[:, 0])
     middle_pixel, middle = pixels.mean(0), world.mean(0)
-    return lambda at: middle + (at - middle_pixel) * [slope, -slope], pixels
-
-
-def markers(picture: Pixels) -> NDArray[np.float64]:
-    """(K, 2) pixels of what stands alone in the picture; what is below has a border."""
-    shown = drawn(picture)
-    shown[-3:] = False
-    labels, count = ndimage.label(shown)
-    return np.reshape(ndimage.center_of_mass(shown, labels, range(1, count + 1)), (-1, 2))[:, ::-1]
+    return lambda at: middle + (at - middle_pixel) * [slope, -slope]
 
 
 def drag(page: Page, start: NDArray[np.float64], end: NDArray[np.float64]) -> None:
@@ -240,20 +225,17 @@ def test_one_click_in_the_scene_selects_the_landmark_and_the_corner_on_top_of_it
     page, server = mapped.page, mapped.server
     seen = map_recording(mapped)["localization"]["innovations"]
     mapped.fit()
-    to_world, drawn_at = world_of_pixels(mapped)
-    before = mapped.still_picture()
-    server.patch("settings", {"view": {"layers": None}})
-    mapped.still_picture(differs_from=before)
-    box = page.locator("#scene").bounding_box()
-    middle, corner = np.array([box["width"], box["height"]]) / 2, np.array([box["x"], box["y"]])
-    pixel = drawn_at[np.linalg.norm(drawn_at - middle, axis=1).argmin()]  # under none of the controls
+    to_world, box = world_of_pixels(mapped), page.locator("#scene").bounding_box()
+    origin, size = np.array([box["x"], box["y"]]), np.array([box["width"], box["height"]])
     in_view = [row for row in landmarks(server) if row["id"] in {pair["landmark"] for pair in seen}]
-    wanted = min(in_view, key=lambda row: np.linalg.norm(to_world(pixel) - [row["x"], row["y"]]))
-    assert np.linalg.norm(to_world(pixel) - [wanted["x"], wanted["y"]]) < 0.15
+    drawn_at = {row["id"]: np.array(mapped.pixel_of("landmark", row["id"])) for row in in_view}
+    wanted = min(in_view, key=lambda row: np.linalg.norm(drawn_at[row["id"]] - origin - size / 2))
+    pixel = drawn_at[wanted["id"]]  # in the middle: under none of the controls
+    assert np.linalg.norm(to_world(pixel - origin) - [wanted["x"], wanted["y"]]) < 0.15
 
     def one_click_selects_both() -> bool:
-        """Once the scene has what is clicked."""
-        page.mouse.click(*(pixel + corner))
+        """Once the page has drawn what is clicked."""
+        page.mouse.click(*pixel)
         page.wait_for_timeout(1000)
         return server.get("selection")["landmark"] is not None
 
@@ -263,6 +245,7 @@ def test_one_click_in_the_scene_selects_the_landmark_and_the_corner_on_top_of_it
     expect(page.get_by_role("heading", name=f"Landmark L{wanted['id']}")).to_be_in_viewport()
 
 
+@pytest.mark.scene
 def test_setting_a_pose_is_given_up_by_escape_and_can_be_done_in_numbers(mapped: Visitor) -> None:
     page = mapped.page
     hint, catcher = page.locator("#place-hint"), page.frame_locator("#scene").locator(".pose-catcher")
@@ -296,7 +279,7 @@ def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
     wait_until(lambda: server.get("localization")["session"] not in (None, session), "it is the map in use")
     loaded = server.get("localization")["session"]
     wait_until(lambda: found_in(server) == "localize, tracking", "the room is recognized")
-    expect(page.locator("#whereabouts-state")).to_have_text("Tracking")
+    expect(page.locator("#pose-panel-state")).to_have_text("Tracking")
     assert server.get("settings")["navigation"]["mode"] == "localize"
     assert {(row["x"], row["y"]) for row in landmarks(server)} == {(row["x"], row["y"]) for row in kept}
     expect(page.locator("#map-list [aria-current]")).to_contain_text(f"Map {loaded}")
@@ -318,14 +301,33 @@ def test_link_keeps_the_mode_and_what_the_landmarks_are(
     mapped: Visitor, visit: Callable[..., Visitor]
 ) -> None:
     page, server = mapped.page, mapped.server
-    mode = {"mode": "slam", "landmarks": "clusters"}
+    mode = {"mode": "slam", "method": "landmarks", "landmarks": "clusters"}
     server.patch("settings", {"clusters": {"method": "dbscan"}, "navigation": mode})
-    page.wait_for_url("**mode=slam&landmarks=clusters&clusters=dbscan**")
+    page.wait_for_url("**mode=slam&method=landmarks&landmarks=clusters&clusters=dbscan**")
     link = page.url.partition("#")[2]
     server.patch("settings", {"clusters": None, "navigation": None})
     visit().open(f"#{link}")
     wait_until(lambda: server.get("settings")["clusters"]["method"] == "dbscan", "the method is set")
     assert server.get("settings")["navigation"].items() >= mode.items()
+
+
+def test_map_of_the_recording_opened_next_is_shown_at_once(mapped: Visitor) -> None:
+    """SLAM goes on from the emulator into a recording, whose map is another one."""
+    server, page = mapped.server, mapped.page
+    server.reset()
+    slam(server)
+    before = server.get("localization")["session"]
+    expect(page.locator("#landmark-count")).not_to_have_text("0")
+    server.api.put("source", json={"kind": "recording", "name": "emulated-s1.mcap"}).raise_for_status()
+    wait_until(lambda: server.get("localization")["session"] not in (None, before), "another map is built")
+    used = server.get("localization")["session"]
+    expect(page.get_by_title(f"Localize in map {used}")).to_have_attribute("aria-current", "true")
+    expect(page.locator("#landmark-count")).not_to_have_text("0")
+    wait_until(lambda: len(landmarks(server)) >= FEW, "there are landmarks")
+    server.pause()
+    wait_until(
+        lambda: page.locator("#landmark-count").inner_text() == str(len(landmarks(server))), "all are counted"
+    )
 
 
 def test_simulation_is_set_up_and_started(mapped: Visitor) -> None:
@@ -337,8 +339,8 @@ def test_simulation_is_set_up_and_started(mapped: Visitor) -> None:
     page.get_by_role("button", name="Start", exact=True).click()
     expect(page.locator("#readout-source")).to_have_text("Simulated robot")
     page.get_by_role("tab", name="Map").click()
-    expect(page.locator("#comparison")).to_contain_text("In truth")
-    expect(page.locator("#legend")).to_contain_text("True way")
+    expect(page.locator("#comparison")).to_contain_text("True pose")
+    expect(page.locator("#legend")).to_contain_text("True path")
     wait_until(lambda: server.get("frame")["source"]["kind"] == "simulation", "frames of it come")
     bearings = [np.arctan2(y, x) for x, y in server.get("frame?points=true")["points"]]
     assert max(np.abs(bearings)) == pytest.approx(np.pi / 2, abs=0.05)

@@ -1,6 +1,7 @@
 """Another source begins anew: its room is looked at, and its charts hold nothing of the one before."""
 
 import numpy as np
+import pytest
 from browsing import Visitor
 from playwright.sync_api import Page
 from waiting import wait_until
@@ -31,6 +32,7 @@ def resting(page: Page) -> list[float]:
     return targets[-1]
 
 
+@pytest.mark.scene
 def test_another_source_is_fitted_in_the_view_and_charted_anew(visitor: Visitor) -> None:
     page, server = visitor.page, visitor.server
     wait_until(lambda: page.evaluate(f"Boolean({CAMERA})"), "the scene has begun")

@@ -1,11 +1,13 @@
 """The page lives: it loads from this machine alone, draws, and follows the frames."""
 
 import numpy as np
+import pytest
 from browsing import Visitor, drawn
 from playwright.sync_api import expect
 from waiting import wait_until
 
 
+@pytest.mark.scene
 def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
     expect(visitor.page).to_have_title("Emulated S1 · lidarcore")
     expect(visitor.page.locator("#connection")).to_have_text("Connected")
@@ -15,6 +17,7 @@ def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
     visitor.check()
 
 
+@pytest.mark.scene
 def test_scene_shows_the_room(visitor: Visitor) -> None:
     def fills_the_scene() -> bool:
         picture = drawn(visitor.picture())
@@ -25,10 +28,19 @@ def test_scene_shows_the_room(visitor: Visitor) -> None:
     wait_until(fills_the_scene, "the room fills the scene")
 
 
+@pytest.mark.scene
 def test_frames_advance_in_figures_and_picture(visitor: Visitor) -> None:
     first, picture = int(visitor.readout("frame")), visitor.picture()
     wait_until(lambda: int(visitor.readout("frame")) > first + 5, "later frames are shown")
     wait_until(lambda: (visitor.picture() != picture).any(), "the picture changes")
+
+
+@pytest.mark.scene
+def test_the_stream_alone_brings_the_frames(visitor: Visitor) -> None:
+    first = int(visitor.readout("frame"))
+    asked = len(visitor.asked)
+    wait_until(lambda: int(visitor.readout("frame")) > first + 25, "later frames are shown")
+    assert not [url for url in visitor.asked[asked:] if "/frame" in url or "/health" in url]
 
 
 def test_figures_are_those_of_the_frame(visitor: Visitor) -> None:
@@ -38,6 +50,7 @@ def test_figures_are_those_of_the_frame(visitor: Visitor) -> None:
     assert page.locator("#corner-table tbody tr").count() == len(frame["corners"])
 
 
+@pytest.mark.scene
 def test_plots_follow_the_frames(visitor: Visitor) -> None:
     page = visitor.page
     page.get_by_role("tab", name="Plots").click()

@@ -11,6 +11,8 @@ from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
 from waiting import wait_until
 
+from lidarcore import open_recording
+
 pytestmark = pytest.mark.real_data
 
 DROP = """([name, text]) => {
@@ -47,6 +49,7 @@ def golf(visitor: Visitor) -> Visitor:
     return visitor
 
 
+@pytest.mark.scene
 def test_upload_is_stored_and_plays(golf: Visitor) -> None:
     server, page = golf.server, golf.page
     assert (server.folder / GOLF.name).read_bytes() == GOLF.read_bytes()
@@ -133,10 +136,21 @@ def test_recording_can_be_left_and_deleted(golf: Visitor) -> None:
     server, page = golf.server, golf.page
     page.get_by_role("button", name="Emulator").click()
     expect(page.locator("#readout-source")).to_have_text("Emulated S1")
-    page.get_by_role("button", name=f"Delete {GOLF.name}").click()
-    page.get_by_role("button", name="Delete", exact=True).click()
-    expect(page.get_by_role("button", name=f"Delete {GOLF.name}")).to_have_count(0)
-    assert not (server.folder / GOLF.name).exists()
+    scans = sum(1 for _ in open_recording(GOLF))
+    wait_until(lambda: server.get(f"recordings/{GOLF.name}/facts")["scans"] == scans, "it is read")
+    expect(page.locator("#library-list li", has_text=GOLF.name)).to_contain_text(re.compile("9[45]\u2009s"))
+    for _ in range(2):
+        page.get_by_role("button", name=f"Delete {GOLF.name}").click()
+        expect(page.get_by_role("button", name=f"Delete {GOLF.name}")).to_have_count(0)
+        assert not (server.folder / GOLF.name).exists()
+        page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_role("button", name=f"Delete {GOLF.name}")).to_be_visible()
+    page.get_by_role("button", name=f"Rename {GOLF.name}").click()
+    page.get_by_label(f"New name of {GOLF.name}").fill("golf 1.csv.gz")
+    page.get_by_role("button", name="Rename", exact=True).click()
+    with page.expect_download() as download:
+        page.get_by_role("link", name="Download golf 1.csv.gz").click()
+    assert Path(download.value.path()).read_bytes() == GOLF.read_bytes()
 
 
 def test_one_of_several_lidars_is_chosen(visitor: Visitor, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """One state for all: links, further browsers, and connections that break."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -31,7 +32,10 @@ def test_link_restores_the_view_in_a_fresh_browser(server: Server, visit: Callab
     second = visit().open(link)
     position = {"kind": "recording", "index": 123}.items()
     wait_until(lambda: server.get("frame")["source"].items() >= position, "the scan of the link is shown")
-    wait_until(lambda: server.get("settings") == wanted, "the settings of the link are restored")
+    wait_until(lambda: second.knows("settings") == wanted, "the settings of the link are restored")
+    of_browser = ("layers", "ellipse_scale")
+    others = server.get("settings")
+    assert others == wanted | {"view": wanted["view"] | {name: others["view"][name] for name in of_browser}}
     assert server.get("source")["state"] == "paused"
     expect(second.page.locator("#position")).to_contain_text("124")
     expect(second.page.get_by_label("Fitter")).to_have_value("cwlf")
@@ -50,8 +54,30 @@ def test_link_to_a_recording_that_is_gone_says_so(server: Server, visit: Callabl
 
 def test_plain_address_leaves_what_others_set_up(server: Server, visit: Callable[..., Visitor]) -> None:
     wanted = server.patch("settings", SHOWN)
-    visit().open()
+    visitor = visit().open()
     assert server.get("settings") == wanted
+    assert visitor.knows("settings") == wanted
+    server.patch("settings", {"extraction": {"corner_gap": 0.1 + 0.2}})
+    visitor.page.wait_for_url(re.compile(r"corner_gap=0\.3(&|$)"))
+
+
+def test_theme_and_layers_belong_to_each_browser_until_they_are_set_for_all(
+    server: Server, visit: Callable[..., Visitor]
+) -> None:
+    first, second = visit(theme="dark").open(), visit(theme="light").open()
+    for visitor, theme in ((first, "dark"), (second, "light")):
+        expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)
+    first.page.locator("label.chip", has_text="Points").click()
+    for _ in range(2):
+        expect(first.page.get_by_role("checkbox", name="Points")).not_to_be_checked()
+        expect(second.page.get_by_role("checkbox", name="Points")).to_be_checked()
+        assert server.get("settings")["view"]["layers"]["points"]
+        first.page.reload()
+    server.patch("settings", {"view": {"layers": {"points": False}}})
+    expect(second.page.get_by_role("checkbox", name="Points")).not_to_be_checked()
+    server.patch("settings", {"view": {"layers": {"points": True}}})
+    for visitor in (first, second):
+        expect(visitor.page.get_by_role("checkbox", name="Points")).to_be_checked()
 
 
 def test_reload_does_not_rewind_what_plays(server: Server, visit: Callable[..., Visitor]) -> None:
@@ -75,7 +101,7 @@ def test_second_browser_sees_the_same(server: Server, visit: Callable[..., Visit
     first.page.get_by_role("button", name="Pause").click()
     expect(second.page.get_by_label("Fitter")).to_have_value("wctls")
     expect(second.page.get_by_role("switch", name="Compare methods")).to_be_checked()
-    expect(second.page.get_by_role("checkbox", name="Grid")).not_to_be_checked()
+    expect(second.page.get_by_role("checkbox", name="Grid")).to_be_checked()
     expect(second.page.get_by_role("button", name="Back to live")).to_be_visible()
     frame = server.pause()
     for visitor in (first, second):
@@ -95,6 +121,7 @@ def own_server(tmp_path: Path) -> Iterator[Server]:
     server.kill()
 
 
+@pytest.mark.scene
 def test_lost_connection_comes_back_by_itself(own_server: Server, visit: Callable[..., Visitor]) -> None:
     visitor = visit(at=own_server)
     visitor.tolerated += ["net::ERR_", "WebSocket", "Failed to fetch"]
@@ -112,6 +139,7 @@ def test_lost_connection_comes_back_by_itself(own_server: Server, visit: Callabl
     wait_until(lambda: (visitor.picture() != picture).mean() > 0.001, "the scene moves again")
 
 
+@pytest.mark.scene
 def test_page_keeps_its_colours_and_says_what_became_of_the_recording_when_the_server_starts_anew(
     own_server: Server, visit: Callable[..., Visitor]
 ) -> None:

@@ -8,6 +8,7 @@ from itertools import islice
 import numpy as np
 import pytest
 from post_scenes import NOISE, Posts, around, posts_ahead, rolled, same_partition, scenes, turned
+from real_recordings import each, where
 
 from lidarcore import Scan, SensorNoise, open_recording
 from lidarcore.clusters import CLUSTERERS, ClusterSettings, cluster
@@ -148,10 +149,9 @@ def test_points_in_one_place_are_one_cluster_with_a_covariance(method):
 
 
 @every_method
-@pytest.mark.real_data
-@pytest.mark.parametrize("recording", RECORDINGS)
-def test_real_scans_give_consistent_clusters(method, recording, data):
-    scan = max(islice(open_recording(data / recording), 20), key=lambda scan: scan.valid.sum())
+@pytest.mark.parametrize("recording", each(RECORDINGS))
+def test_real_scans_give_consistent_clusters(method, recording):
+    scan = max(islice(open_recording(where(recording)), 20), key=lambda scan: scan.valid.sum())
     found = cluster(scan, settings(method, noise=SensorNoise()))
     assert len(found) > 0
     assert_consistent(found, scan, 2)

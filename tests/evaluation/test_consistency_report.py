@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from html_tables import Tables
+from lidarcore_app.cli.main import cli
 from typer.testing import CliRunner
 
-from app.cli import cli
 from lidarcore import FITTERS, SensorNoise
-from lidarcore.evaluation.consistency import Consistency, Design, Row, study
-from lidarcore.evaluation.consistency_design import KINDS
-from lidarcore.evaluation.consistency_figures import SUMS, tally
-from lidarcore.evaluation.consistency_report import html
-from lidarcore.evaluation.consistency_verdicts import verdict
+from lidarcore.evaluation.consistency.design import KINDS
+from lidarcore.evaluation.consistency.figures import SUMS, tally
+from lidarcore.evaluation.consistency.report import html
+from lidarcore.evaluation.consistency.study import Consistency, Design, Row, study
+from lidarcore.evaluation.consistency.trials import Trials
+from lidarcore.evaluation.consistency.verdicts import verdict
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.evaluation.trials import Trials
 
 DESIGN = Design(
     rooms=("4.5x2.5", "corridor"),

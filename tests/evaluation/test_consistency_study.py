@@ -5,24 +5,22 @@ import io
 import json
 import os
 import signal
-import sqlite3
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
 from distributed import LocalCluster
+from lidarcore_app.cli.main import cli, main
 from pydantic import ValidationError
 from typer.testing import CliRunner
 
-from app.cli import cli, main
 from lidarcore import FITTERS, SensorNoise
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation import consistency_tables
-from lidarcore.evaluation.consistency import ALL_ROOMS, Design, study
-from lidarcore.evaluation.consistency_design import ROOMS
-from lidarcore.evaluation.consistency_figures import FIGURES
+from lidarcore.evaluation.consistency import tables as consistency_tables
+from lidarcore.evaluation.consistency.design import ROOMS
+from lidarcore.evaluation.consistency.figures import FIGURES
+from lidarcore.evaluation.consistency.study import ALL_ROOMS, Design, study
 
 DESIGN = Design(
     rooms=("4.5x2.5", "corridor"),
@@ -39,14 +37,6 @@ def uninterrupted():
     return study(DESIGN)
 
 
-def interrupt_after(chunks):
-    def progress(done, of):
-        if done == chunks:
-            raise KeyboardInterrupt
-
-    return progress
-
-
 def test_results_do_not_depend_on_the_number_of_workers(uninterrupted):
     assert (study(DESIGN, workers=2).sums == uninterrupted.sums).all()
 
@@ -59,50 +49,9 @@ def test_results_do_not_depend_on_where_dask_runs_them(uninterrupted):
     assert (result.sums == uninterrupted.sums).all()
 
 
-def test_interrupted_twice_and_resumed_is_uninterrupted(tmp_path, uninterrupted):
-    file, done = tmp_path / "study.db", []
-    for chunks in (3, 7):
-        with pytest.raises(KeyboardInterrupt):
-            study(DESIGN, results=file, progress=interrupt_after(chunks))
-    result = study(DESIGN, results=file, progress=lambda n, of: done.append((n, of)))
-    assert done == [(n, 10) for n in range(7, 11)]
-    assert (result.sums == uninterrupted.sums).all()
-
-
 def test_another_seed_gives_other_numbers(uninterrupted):
     other = study(Design(**{**vars(DESIGN), "seed": 4}))
     assert not np.isclose(other.sums[..., 2], uninterrupted.sums[..., 2]).any()
-
-
-@pytest.mark.parametrize("change", [{"seed": 1}, {"beams": 361}, {"noises": (SensorNoise(0.03, 0.001),)}])
-def test_results_of_another_study_are_not_mixed_in(tmp_path, change):
-    file = tmp_path / "study.db"
-    with pytest.raises(KeyboardInterrupt):
-        study(DESIGN, results=file, progress=interrupt_after(1))
-    kept = file.read_bytes()
-    with pytest.raises(EvaluationError, match="another study"):
-        study(Design(**{**vars(DESIGN), **change}), results=file)
-    assert file.read_bytes() == kept
-
-
-def test_results_of_other_code_are_not_mixed_in(tmp_path):
-    file = tmp_path / "study.db"
-    with pytest.raises(KeyboardInterrupt):
-        study(DESIGN, results=file, progress=interrupt_after(1))
-    with sqlite3.connect(file) as database:
-        (text,) = database.execute("select description from study").fetchone()
-        database.execute("update study set description = ?", (text.replace('"code": "', '"code": "0'),))
-    database.close()
-    with pytest.raises(EvaluationError, match="other code"):
-        study(DESIGN, results=file)
-
-
-def test_a_file_that_is_none_of_ours_is_refused_and_left_alone(tmp_path):
-    file = tmp_path / "notes.txt"
-    file.write_text("Buy milk.\n" * 100)
-    with pytest.raises(EvaluationError, match=r"notes\.txt cannot hold"):
-        study(DESIGN, results=file)
-    assert file.read_text() == "Buy milk.\n" * 100
 
 
 def test_no_scheduler_there_is_said():
@@ -207,7 +156,6 @@ def test_the_command_prints_a_table_and_writes_the_file(tmp_path):
         (["--segments", "some"], "known, found or both"),
         (["-o", "out.txt"], "should end in"),
         (["-o", "nowhere/out.csv"], "nowhere/out.csv"),
-        (["--results", "nowhere/study.db"], "nowhere/study.db"),
     ],
 )
 def test_what_is_wrong_with_the_command_is_said_at_once(options, said, monkeypatch, capsys):
@@ -218,34 +166,17 @@ def test_what_is_wrong_with_the_command_is_said_at_once(options, said, monkeypat
     assert said in " ".join(capsys.readouterr().err.replace("│", " ").split())
 
 
-def test_ctrl_c_on_two_workers_and_the_same_command_again_give_the_same_file(tmp_path):
-    def arguments(name, workers):
-        files = ["--results", str(tmp_path / f"{name}.db"), "-o", str(tmp_path / f"{name}.json")]
-        return [*COMMAND, "--trials", "40000", "--workers", str(workers), *files]
-
-    command = [sys.executable, "-m", "app.cli", *arguments("stopped", 2)]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True) as run:
-        while finished(tmp_path / "stopped.db") < 2:
-            assert run.poll() is None
-            time.sleep(0.01)
+def test_ctrl_c_ends_the_workers_too_and_writes_nothing(tmp_path):
+    output = tmp_path / "study.json"
+    arguments = [*COMMAND, "--trials", "400000", "--workers", "2", "--progress", "-o", str(output)]
+    command = [sys.executable, "-m", "lidarcore_app.cli.main", *arguments]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as run:
+        assert any(" 2 " in line for line in run.stderr)  # two parts are done
         os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to the workers, too
-        _, said = run.communicate()
+        said = run.stderr.read()
+        run.wait()
     assert run.returncode == 130
-    assert said == "Interrupted: the same command goes on from there.\n"
-    assert 2 <= finished(tmp_path / "stopped.db") < 40
-    for name in ("stopped", "straight"):
-        assert CliRunner().invoke(cli, arguments(name, 1)).exit_code == 0
-    assert (tmp_path / "stopped.json").read_bytes() == (tmp_path / "straight.json").read_bytes()
-
-
-def finished(file):
-    """Chunks in a file of results that another process writes."""
-    if not file.exists():
-        return 0
-    database = sqlite3.connect(file)
-    try:
-        return database.execute("select count(*) from chunk").fetchone()[0]
-    except sqlite3.OperationalError:  # its tables are just being made
-        return 0
-    finally:
-        database.close()
+    assert said.endswith("Interrupted: nothing was written.\n")
+    assert not output.exists()

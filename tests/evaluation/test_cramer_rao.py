@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from lidarcore import FITTERS, SensorNoise
-from lidarcore.evaluation.cramer_rao import corner_bound, line_bound
+from lidarcore.evaluation.consistency.cramer_rao import bounded_line, corner_bound
+from lidarcore.lines import LINE_FIELDS
+from lidarcore.tables import LINE_CONSISTENT
 
 NOISES = [SensorNoise(0.05, np.radians(0.2)), SensorNoise(0.01, 0.001), SensorNoise(0.002, 0.02)]
 
@@ -29,6 +31,12 @@ def bound_of_first_two(fisher):
 def relative(found, expected):
     sigma = np.sqrt(np.diag(expected))
     return np.abs((found - expected) / np.outer(sigma, sigma)).max()
+
+
+def line_bound(alpha, r, bearings, noise):
+    row = np.empty(LINE_FIELDS)
+    bounded_line(bearings, np.cos(alpha), np.sin(alpha), r, noise.sigma_range**2, noise.sigma_bearing**2, row)
+    return row[LINE_CONSISTENT : LINE_CONSISTENT + 4].reshape(2, 2)
 
 
 CORNERS = [  # x, y, directions of the two walls from the corner, how far each is seen, increment of bearing

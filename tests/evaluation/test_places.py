@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from lidarcore import FITTERS, ExtractionSettings, SensorNoise, extract
-from lidarcore.evaluation.consistency_design import ROOMS, room
-from lidarcore.evaluation.cramer_rao import corner_bound
-from lidarcore.evaluation.places import MIN_BEAMS, places
-from lidarcore.evaluation.trials import measure, most_met, simulate
+from lidarcore.evaluation.consistency.cramer_rao import corner_bound
+from lidarcore.evaluation.consistency.design import ROOMS, room
+from lidarcore.evaluation.consistency.trials import measure, most_met, simulate
+from lidarcore.evaluation.repeatability.places import MIN_BEAMS, places
 from lidarcore.scan import Scan
 
 NOISE = SensorNoise(0.02, 0.002)

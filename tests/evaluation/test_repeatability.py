@@ -9,18 +9,18 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from lidarcore_app.cli.main import cli
 from scipy import stats
 from typer.testing import CliRunner
 
-from app.cli import cli
 from lidarcore import ExtractionSettings, Features, Scan, SensorNoise, compare, open_recording
 from lidarcore import tables as columns
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.evaluation.repeatability import Repeatability
-from lidarcore.evaluation.repeatability_summary import Judgement, verdict
-from lidarcore.evaluation.repeatability_tables import to_csv, to_json
-from lidarcore.evaluation.scatter import SIGHTING, Sightings, scatter
+from lidarcore.evaluation.repeatability.scatter import SIGHTING, Observations, scatter
+from lidarcore.evaluation.repeatability.statistics import Repeatability
+from lidarcore.evaluation.repeatability.summary import Judgement, verdict
+from lidarcore.evaluation.repeatability.tables import to_csv, to_json
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
@@ -35,6 +35,13 @@ def found(xy, covariance, published=None) -> dict[str, Features]:
     k = len(xy)
     table = np.zeros((3 * k, columns.FIELDS))
     table[: 2 * k, columns.FIRST_BEAM] = table[: 2 * k, columns.LAST_BEAM] = np.arange(2 * k)
+    alpha = 3 * np.arange(2 * k) / (2 * k)
+    table[: 2 * k, columns.NORMAL] = np.cos(alpha)
+    table[: 2 * k, columns.NORMAL + 1] = np.sin(alpha)
+    table[: 2 * k, columns.DISTANCE] = 2.0
+    for end, along in ((columns.START, -0.1), (columns.END, 0.1)):
+        table[: 2 * k, end] = 2 * np.cos(alpha) - along * np.sin(alpha)
+        table[: 2 * k, end + 1] = 2 * np.sin(alpha) + along * np.cos(alpha)
     corners = table[2 * k :]
     corners[:, :2] = xy
     corners[:, columns.CORNER_CONSISTENT :][:, :4] = np.ravel(covariance)
@@ -108,7 +115,7 @@ def verdicts(corners, claim, studies, seed=0):
     table[..., :2] = rng.normal(size=(corners * scans, studies, 2))
     table[..., 2:6] = table[..., 6:] = np.ravel(claim)
     ids, at = np.repeat(np.arange(corners), scans), np.tile(np.arange(scans), corners)
-    found = scatter(Sightings(ids, at, table), scans)
+    found = scatter(Observations(ids, at, table), scans)
     words = Counter(verdict(found.judgement(m, 0)) for m in range(studies))
     return {word: words[word] / studies for word in ("true", "too small", "too large", "open")}
 
@@ -348,7 +355,7 @@ def test_the_command_tells_and_writes_what_the_library_finds(data, tmp_path, suf
     arguments += ["--set", "noise.sigma_range=0.003", "-o", str(output)]
     result = CliRunner().invoke(cli, arguments)
     assert result.exit_code == 0, result.output
-    assert "The last 100 scans" in result.output
+    assert "in the last 100 scans" in result.output
     study = Repeatability(methods=["ml", "cwlf"])
     settings = ExtractionSettings(noise=replace(ExtractionSettings().noise, sigma_range=0.003))
     for scan in islice(open_recording(recording), 5, 105):
@@ -357,8 +364,11 @@ def test_the_command_tells_and_writes_what_the_library_finds(data, tmp_path, suf
         assert json.loads(output.read_text()) == json.loads(json.dumps(asdict(study.summary())))
     else:
         rows = list(csv.DictReader(output.read_text().splitlines()))
-        assert [(row["fitter"], row["covariance"]) for row in rows] == [
-            (name, kind) for name in ("ml", "cwlf") for kind in ("published", "consistent")
+        assert [(row["of"], row["fitter"], row["covariance"]) for row in rows] == [
+            (of, name, kind)
+            for of in ("corners", "walls")
+            for name in ("ml", "cwlf")
+            for kind in ("published", "consistent")
         ]
         assert float(rows[1]["coverage_95"]) == of(study).coverage_95.value
 
@@ -407,7 +417,7 @@ def test_the_command_tells_the_verdict_in_words(recorded):
         result = command(path, "--methods", METHOD, "--set", f"noise.sigma_range={sigma}")
         assert result.exit_code == 0, result.output
         assert "ellipses are" in result.output
-        assert result.output.count(word) == 2
+        assert result.output.count(word) == 4  # corners and walls, both covariances
 
 
 def test_the_command_refuses_a_file_of_another_kind_before_it_works(tmp_path):

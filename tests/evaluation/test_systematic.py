@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from lidarcore import Scan, SensorNoise
-from lidarcore.evaluation.calibration import calibrate
-from lidarcore.evaluation.systematic import alignment, range_bias, wall_shapes
-from lidarcore.evaluation.wall_beams import beams_on_walls
+from lidarcore.evaluation.calibration.calibrate import calibrate
+from lidarcore.evaluation.calibration.systematic import alignment, range_bias, wall_shapes
+from lidarcore.evaluation.calibration.wall_beams import beams_on_walls
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
 from lidarcore.simulation.rooms import polygon, rectangular_room
 from lidarcore.simulation.world import World

@@ -7,8 +7,8 @@ from scipy.stats import chi2
 
 from lidarcore import open_recording
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.variances import variance_model
-from lidarcore.evaluation.wall_beams import beams_on_walls
+from lidarcore.evaluation.calibration.variances import variance_model
+from lidarcore.evaluation.calibration.wall_beams import beams_on_walls
 
 BANDS = 4
 ENOUGH = 1e-3  # of log-likelihood: a twentieth of a standard error

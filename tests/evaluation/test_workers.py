@@ -9,7 +9,7 @@ ROOT = Path(__file__).parents[2]
 # An interpreter in which `import distributed` fails, as where the extra was not installed.
 WITHOUT = "import sys; sys.modules['distributed'] = None; "
 COMMAND = WITHOUT + (
-    "from app.cli import main; "
+    "from lidarcore_app.cli.main import main; "
     "sys.argv = ['lidarcore', 'evaluate', 'consistency', '--scheduler', 'tcp://127.0.0.1:8786', '--trials', '100']; "
     "main()"
 )

@@ -27,9 +27,9 @@ from lidarcore.experiments.cwlf_claims import claims as claims_of_cwlf
 from lidarcore.experiments.cwlf_report import html as report_of_cwlf
 from lidarcore.experiments.cwlf_timing import Times
 from lidarcore.experiments.environments import Design
-from lidarcore.experiments.report import Agreement
 from lidarcore.experiments.wctls_claims import claims as claims_of_wctls
 from lidarcore.experiments.wctls_report import html as report_of_wctls
+from lidarcore.reporting import Agreement
 from lidarcore.scan import Array
 
 
@@ -66,12 +66,12 @@ def test_intervals_of_ratios_of_medians_hold_the_true_one_as_often_as_they_say()
 
 
 @pytest.fixture(scope="module")
-def of_cwlf() -> cwlf.Result:
+def of_cwlf() -> cwlf.CwlfStudy:
     return cwlf.run(Design(seed=3).quick())
 
 
 @pytest.fixture(scope="module")
-def of_wctls() -> wctls.Result:
+def of_wctls() -> wctls.WctlsStudy:
     return wctls.run(Design(seed=3, split_threshold=wctls.THRESHOLD).quick())
 
 
@@ -81,7 +81,7 @@ def verdict(claims: list[Claim], begins: str, room: str = "") -> Agreement:
 
 
 Change = Callable[[CornerStudy], CornerStudy]
-Of = TypeVar("Of", cwlf.Result, wctls.Result)
+Of = TypeVar("Of", cwlf.CwlfStudy, wctls.WctlsStudy)
 
 
 def with_claims(fitter: str, of: str, factors: Array | float, kind: str = "published") -> Change:
@@ -120,16 +120,16 @@ def changed(result: Of, *changes: Change) -> Of:
     return replace(result, environments=environments)
 
 
-def cwlf_with(result: cwlf.Result, *changes: Change) -> list[Claim]:
+def cwlf_with(result: cwlf.CwlfStudy, *changes: Change) -> list[Claim]:
     return claims_of_cwlf(changed(result, *changes))
 
 
-def wctls_with(result: wctls.Result, *changes: Change) -> list[Claim]:
+def wctls_with(result: wctls.WctlsStudy, *changes: Change) -> list[Claim]:
     return claims_of_wctls(changed(result, *changes))
 
 
 @pytest.mark.parametrize(("larger", "expected"), [(0, True), (1, True), (2, False)])
-def test_save_one_corner_means_one(of_cwlf: cwlf.Result, larger: int, expected: bool) -> None:
+def test_save_one_corner_means_one(of_cwlf: cwlf.CwlfStudy, larger: int, expected: bool) -> None:
     def change(study: CornerStudy) -> CornerStudy:
         factors = np.where(np.arange(len(study.corners)) < larger, 1.1, 0.9)[:, None, None, None]
         return with_claims("cwlf", "arras_siegwart", factors)(study)
@@ -142,7 +142,9 @@ def test_save_one_corner_means_one(of_cwlf: cwlf.Result, larger: int, expected: 
     ("x", "y", "expected"),
     [(0.68, 0.65, True), (0.83, 0.65, True), (0.87, 0.65, False), (0.68, 0.47, False), (0.36, 0.34, False)],
 )
-def test_means_must_be_of_the_papers_ratio(of_cwlf: cwlf.Result, x: float, y: float, expected: bool) -> None:
+def test_means_must_be_of_the_papers_ratio(
+    of_cwlf: cwlf.CwlfStudy, x: float, y: float, expected: bool
+) -> None:
     claims = cwlf_with(of_cwlf, with_claims("cwlf", "arras_siegwart", np.outer([x, y], [x, y])))
     assert verdict(claims, "By these means", "environment A") is expected
     assert verdict(claims, "On average", "environment A") == "not comparable"
@@ -150,14 +152,14 @@ def test_means_must_be_of_the_papers_ratio(of_cwlf: cwlf.Result, x: float, y: fl
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(0.99, True), (1.01, False)])
-def test_accuracy_is_of_errors(of_cwlf: cwlf.Result, factor: float, expected: bool) -> None:
+def test_accuracy_is_of_errors(of_cwlf: cwlf.CwlfStudy, factor: float, expected: bool) -> None:
     claims = cwlf_with(of_cwlf, with_errors("cwlf", "arras_siegwart", lambda e: factor * e))
     assert verdict(claims, "CWLF has higher levels of accuracy", "environment A") is expected
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(1.5, True), (1.0, None), (0.5, False), (0.01, False)])
 def test_realism_is_that_more_of_the_corners_are_where_they_are_said_to_be(
-    of_cwlf: cwlf.Result, of_wctls: wctls.Result, factor: float, expected: bool | None
+    of_cwlf: cwlf.CwlfStudy, of_wctls: wctls.WctlsStudy, factor: float, expected: bool | None
 ) -> None:
     """Arras-Siegwart's ellipses hold too few of the corners here; so do those of UTLS when they are shrunk."""
     changes = (
@@ -171,7 +173,7 @@ def test_realism_is_that_more_of_the_corners_are_where_they_are_said_to_be(
     assert verdict(wctls_with(of_wctls, *changes), "WCTLS makes landmarks", "environment B") is expected
 
 
-def with_times(result: cwlf.Result, cwlf_us: float, steps: tuple[tuple[float, ...], ...]) -> list[Claim]:
+def with_times(result: cwlf.CwlfStudy, cwlf_us: float, steps: tuple[tuple[float, ...], ...]) -> list[Claim]:
     """Arras-Siegwart takes 100 µs for any corner."""
     totals = {"arras_siegwart": 100.0, "cwlf": cwlf_us}
     return claims_of_cwlf(
@@ -191,7 +193,7 @@ def with_times(result: cwlf.Result, cwlf_us: float, steps: tuple[tuple[float, ..
     ],
 )  # fmt: skip
 def test_times_and_their_shares(
-    of_cwlf: cwlf.Result, cwlf_us: float, arras_siegwart: float, line: float, expected: tuple[bool, ...]
+    of_cwlf: cwlf.CwlfStudy, cwlf_us: float, arras_siegwart: float, line: float, expected: tuple[bool, ...]
 ) -> None:
     steps = (100 - arras_siegwart, arras_siegwart, 0, 0), (line, 100 - line, 0, 0)
     claims = with_times(of_cwlf, cwlf_us, steps)
@@ -205,7 +207,7 @@ def test_times_and_their_shares(
     [((30, 15), True), ((39, 6), True), ((41, 15), False), ((30, 4), False), ((35, 1), False)],
 )
 def test_the_chosen_corner_must_fall_as_much_as_in_the_paper(
-    of_cwlf: cwlf.Result, falls: tuple[float, float], expected: bool
+    of_cwlf: cwlf.CwlfStudy, falls: tuple[float, float], expected: bool
 ) -> None:
     share = {"cwlf": 1 - np.array(falls) / 100, "arras_siegwart": np.ones(2)}
     uncertainties = {
@@ -217,7 +219,7 @@ def test_the_chosen_corner_must_fall_as_much_as_in_the_paper(
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(0.99, True), (1.01, False)])
-def test_more_measurements_must_scatter_less(of_cwlf: cwlf.Result, factor: float, expected: bool) -> None:
+def test_more_measurements_must_scatter_less(of_cwlf: cwlf.CwlfStudy, factor: float, expected: bool) -> None:
     _, many = cwlf.COMPARED
     uncertainties = {
         key: replace(u, scatter=np.full(2, 0.01 * (factor if key[2] == many else 1)))
@@ -229,14 +231,14 @@ def test_more_measurements_must_scatter_less(of_cwlf: cwlf.Result, factor: float
 
 @pytest.mark.parametrize(("apart", "expected"), [(0.95, True), (1.05, False)])
 def test_places_are_equivalent_if_they_are_nearer_to_each_other_than_to_the_truth(
-    of_wctls: wctls.Result, apart: float, expected: bool
+    of_wctls: wctls.WctlsStudy, apart: float, expected: bool
 ) -> None:
     claims = wctls_with(of_wctls, with_errors("wctls", "utls", lambda e: (1 + apart) * e))
     assert verdict(claims, "All three methods", "environment A") is expected
 
 
 @pytest.mark.parametrize(("sigma", "expected"), [(1.04, True), (1.06, False), (0.96, True), (0.94, False)])
-def test_a_few_per_cent_are_five(of_wctls: wctls.Result, sigma: float, expected: bool) -> None:
+def test_a_few_per_cent_are_five(of_wctls: wctls.WctlsStudy, sigma: float, expected: bool) -> None:
     claims = wctls_with(of_wctls, with_claims("wtls", "utls", sigma**2))
     assert verdict(claims, "UTLS and WTLS claim nearly", "environment A") is expected
 
@@ -246,7 +248,7 @@ def test_a_few_per_cent_are_five(of_wctls: wctls.Result, sigma: float, expected:
     [(3.6, True, True), (2.2, False, True), (7.6, False, False), (1.3, False, False)],
 )
 def test_factors_of_the_standard_deviations(
-    of_wctls: wctls.Result, factor: float, in_a: bool, in_b: bool
+    of_wctls: wctls.WctlsStudy, factor: float, in_a: bool, in_b: bool
 ) -> None:
     claims = wctls_with(of_wctls, with_claims("wctls", "utls", factor**-2))
     assert verdict(claims, "WCTLS claims standard deviations", "environment A") is in_a
@@ -258,7 +260,7 @@ def test_factors_of_the_standard_deviations(
     [(7.2, True, False), (8.7, True, False), (11.9, False, False), (2.0, False, True)],
 )
 def test_areas_must_be_of_the_papers_ratio(
-    of_wctls: wctls.Result, factor: float, in_a: bool, in_b: bool
+    of_wctls: wctls.WctlsStudy, factor: float, in_a: bool, in_b: bool
 ) -> None:
     claims = wctls_with(of_wctls, with_claims("wctls", "utls", 1 / factor))
     for room, expected in (("environment A", in_a), ("environment B", in_b)):
@@ -267,19 +269,19 @@ def test_areas_must_be_of_the_papers_ratio(
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(0.9, True), (1.1, False)])
-def test_dispersion_is_of_the_areas(of_wctls: wctls.Result, factor: float, expected: bool) -> None:
+def test_dispersion_is_of_the_areas(of_wctls: wctls.WctlsStudy, factor: float, expected: bool) -> None:
     claims = wctls_with(of_wctls, with_claims("wctls", "utls", factor))
     assert verdict(claims, "The dispersion", "environment A") is expected
 
 
 @pytest.mark.parametrize(("factor", "expected"), [(0.94, True), (0.96, False), (1.0, False)])
-def test_a_gain_must_be_one(of_wctls: wctls.Result, factor: float, expected: bool) -> None:
+def test_a_gain_must_be_one(of_wctls: wctls.WctlsStudy, factor: float, expected: bool) -> None:
     claims = wctls_with(of_wctls, with_claims("wctls", "wtls", factor, "consistent"))
     assert verdict(claims, "The gain comes", "environment A") is expected
 
 
 @pytest.mark.parametrize(("many", "expected"), [(12, True), (13, False)])
-def test_complexity_is_growth(of_wctls: wctls.Result, many: float, expected: bool) -> None:
+def test_complexity_is_growth(of_wctls: wctls.WctlsStudy, many: float, expected: bool) -> None:
     times = {key: 1.0 if key[1] == wctls.POINTS[0] else 10.0 for key in of_wctls.times}
     times["wctls", wctls.POINTS[1]] = many
     assert verdict(claims_of_wctls(replace(of_wctls, times=times)), "WCTLS does not increase") is expected
@@ -289,7 +291,7 @@ Row = tuple[str, str, str]
 
 
 @pytest.fixture(scope="module")
-def rows(of_cwlf: cwlf.Result, of_wctls: wctls.Result) -> list[Row]:
+def rows(of_cwlf: cwlf.CwlfStudy, of_wctls: wctls.WctlsStudy) -> list[Row]:
     """Claim, what was measured and verdict, as both reports show them."""
     shown = []
     for report in (report_of_cwlf(of_cwlf), report_of_wctls(of_wctls)):
@@ -303,7 +305,7 @@ def intervals(text: str) -> list[tuple[float, float]]:
 
 
 def test_reports_say_of_every_claim_whether_it_agrees_and_why_not(
-    rows: list[Row], of_cwlf: cwlf.Result, of_wctls: wctls.Result
+    rows: list[Row], of_cwlf: cwlf.CwlfStudy, of_wctls: wctls.WctlsStudy
 ) -> None:
     claims = [*claims_of_cwlf(of_cwlf), *claims_of_wctls(of_wctls)]
     words = {True: "agrees", False: "differs", None: "open", "not comparable": "not comparable"}

@@ -17,9 +17,9 @@ from lidarcore.experiments.clustering_ekf import (
     METHODS,
     MODES,
     TRAJECTORIES,
+    ClusteringStudy,
     Design,
     Outcome,
-    Result,
     run,
     simulate,
 )
@@ -31,16 +31,16 @@ DESIGN = Design(runs=1, seed=3).quick()
 
 
 @pytest.fixture(scope="module")
-def result() -> Result:
+def result() -> ClusteringStudy:
     return run(DESIGN)
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory, result: Result) -> str:
+def report(tmp_path_factory: pytest.TempPathFactory, result: ClusteringStudy) -> str:
     """Written by the real command with two workers; after the result, which compiles what both need."""
     path = tmp_path_factory.mktemp("report") / "report.html"
     options = ["--quick", "--seed", "3", "--runs", "1", "--workers", "2", "--output", str(path)]
-    command = [sys.executable, "-m", "app.cli", "experiment", "clustering-ekf", *options]
+    command = [sys.executable, "-m", "lidarcore_app.cli.main", "experiment", "clustering-ekf", *options]
     done = subprocess.run(command, capture_output=True, text=True, timeout=250)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == f"{path}: 12 drives, runs x trajectories x methods\n"
@@ -80,7 +80,9 @@ class Tables(HTMLParser):
             self._rows[-1][-1] += data
 
 
-def test_the_tables_of_the_command_hold_the_numbers_of_the_library(report: str, result: Result) -> None:
+def test_the_tables_of_the_command_hold_the_numbers_of_the_library(
+    report: str, result: ClusteringStudy
+) -> None:
     """The library ran them one after the other, the command on two processes."""
     tables = Tables(report).tables
     for caption, name, factor, digits in (
@@ -137,12 +139,12 @@ def test_seeds_runs_and_trajectories_have_errors_of_their_own_and_a_run_its_obje
     assert np.array_equal(posts, drive(0, "straight")[1])
 
 
-def test_without_the_filter_the_method_makes_no_difference(result: Result) -> None:
+def test_without_the_filter_the_method_makes_no_difference(result: ClusteringStudy) -> None:
     for name in ("accumulated", "rms", "anees"):
         assert np.ptp(result.error("without", name), axis=2).max() == 0
 
 
-def test_the_filter_gains_on_odometry_and_coasts_while_objects_are_lost(result: Result) -> None:
+def test_the_filter_gains_on_odometry_and_coasts_while_objects_are_lost(result: ClusteringStudy) -> None:
     assert result.error("with", "rms").mean() < 0.4 * result.error("without", "rms").mean()
     for outcome in result.outcomes[: 3 * len(METHODS)]:
         sigma = {
@@ -167,7 +169,7 @@ def test_the_papers_error_is_the_distance_in_y_at_the_same_x() -> None:
     assert np.allclose(off_in_y(poses, path), [0, 0.2, 0.1, 0, 0], atol=1e-4)
 
 
-def with_dbscan(result: Result, factor: float, spread: float) -> Result:
+def with_dbscan(result: ClusteringStudy, factor: float, spread: float) -> ClusteringStudy:
     """The result with ten runs, all methods alike but for what DBSCAN's error is a multiple of."""
     rng = np.random.default_rng(0)
 
@@ -180,10 +182,10 @@ def with_dbscan(result: Result, factor: float, spread: float) -> Result:
 
     first = [o for o in result.outcomes if o.run == 0]
     outcomes = [changed(outcome, number) for number in range(10) for outcome in first]
-    return Result(replace(result.design, runs=10), outcomes)
+    return ClusteringStudy(replace(result.design, runs=10), outcomes)
 
 
-def test_claims_agree_differ_or_stay_open_as_the_runs_say(result: Result) -> None:
+def test_claims_agree_differ_or_stay_open_as_the_runs_say(result: ClusteringStudy) -> None:
     def verdict(factor: float, spread: float) -> bool | None:
         return next(
             agrees for claim, _, agrees in claims(with_dbscan(result, factor, spread)) if "5 %" in claim
@@ -205,7 +207,7 @@ def test_intervals_hold_the_mean_as_often_as_they_say() -> None:
 
 
 def test_a_report_that_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "app.cli", "experiment", "clustering-ekf", "-o"]
+    command = [sys.executable, "-m", "lidarcore_app.cli.main", "experiment", "clustering-ekf", "-o"]
     for output in (tmp_path, tmp_path / "none" / "report.html"):
         done = subprocess.run([*command, str(output)], capture_output=True, text=True, timeout=60)
         assert done.returncode == 2

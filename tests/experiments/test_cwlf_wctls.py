@@ -14,7 +14,7 @@ from html_tables import Tables
 from lidarcore import Scan
 from lidarcore.corners import intersect
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.places import MIN_BEAMS, MIN_EXTENT
+from lidarcore.evaluation.repeatability.places import MIN_BEAMS, MIN_EXTENT
 from lidarcore.experiments import cwlf, wctls
 from lidarcore.experiments.claim_rules import RULES
 from lidarcore.experiments.corner_study import recorded
@@ -28,17 +28,18 @@ from lidarcore.lines import FITTERS, LINE_FIELDS
 from lidarcore.noise import SensorNoise
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor
+from lidarcore.tables import CORNER_FIELDS
 
 DESIGN = Design(seed=3).quick()
 
 
 @pytest.fixture(scope="module")
-def of_cwlf() -> cwlf.Result:
+def of_cwlf() -> cwlf.CwlfStudy:
     return cwlf.run(DESIGN)
 
 
 @pytest.fixture(scope="module")
-def of_wctls() -> wctls.Result:
+def of_wctls() -> wctls.WctlsStudy:
     return wctls.run(Design(seed=3, split_threshold=wctls.THRESHOLD).quick())
 
 
@@ -51,7 +52,16 @@ def command(tmp_path_factory: pytest.TempPathFactory) -> Command:
 
     def run(name: str, *options: str, told: str, before: str = "") -> str:
         path = tmp_path_factory.mktemp("report") / "report.html"
-        arguments = [sys.executable, "-m", "app.cli", "experiment", name, *options, "-o", str(path)]
+        arguments = [
+            sys.executable,
+            "-m",
+            "lidarcore_app.cli.main",
+            "experiment",
+            name,
+            *options,
+            "-o",
+            str(path),
+        ]
         done = subprocess.run(arguments, capture_output=True, text=True, timeout=250)
         assert (done.returncode, done.stderr) == (0, "")
         assert re.fullmatch(before + re.escape(f"{path}: ") + told + "\n", done.stdout), done.stdout
@@ -66,7 +76,9 @@ def assert_complete(report: str, figures: tuple[int, ...]) -> None:
     assert not re.search(r"\bnan\b|\binf\b", report, re.IGNORECASE)
 
 
-def test_the_tables_of_cwlf_hold_the_numbers_of_the_library(command: Command, of_cwlf: cwlf.Result) -> None:
+def test_the_tables_of_cwlf_hold_the_numbers_of_the_library(
+    command: Command, of_cwlf: cwlf.CwlfStudy
+) -> None:
     """The library ran in one process, the command in two."""
     claims = claims_of_cwlf(of_cwlf)
     report = command("cwlf", "--quick", "--seed", "3", "--workers", "2", told=f"{len(claims)} claims.*")
@@ -97,7 +109,7 @@ def test_the_tables_of_cwlf_hold_the_numbers_of_the_library(command: Command, of
 
 
 def test_the_tables_of_wctls_hold_the_numbers_of_the_library(
-    command: Command, of_wctls: wctls.Result
+    command: Command, of_wctls: wctls.WctlsStudy
 ) -> None:
     claims = claims_of_wctls(of_wctls)
     report = command("wctls", "--quick", "--seed", "3", "--workers", "1", told=f"{len(claims)} claims.*")
@@ -129,7 +141,7 @@ def test_rooms_have_the_sizes_of_the_papers_and_show_as_many_walls_and_corners(r
 
 
 def test_the_published_ellipses_are_below_the_bound_and_hold_too_few_of_the_corners(
-    of_cwlf: cwlf.Result, of_wctls: wctls.Result
+    of_cwlf: cwlf.CwlfStudy, of_wctls: wctls.WctlsStudy
 ) -> None:
     for environments, fitter in ((of_cwlf.environments, "cwlf"), (of_wctls.environments, "wctls")):
         for environment in environments:
@@ -140,7 +152,9 @@ def test_the_published_ellipses_are_below_the_bound_and_hold_too_few_of_the_corn
             assert (study.scatter(fitter) > (1 - 5 / 200**0.5) * study.bound).all()
 
 
-def test_normalising_the_line_changes_no_corner_and_no_consistent_covariance(of_wctls: wctls.Result) -> None:
+def test_normalising_the_line_changes_no_corner_and_no_consistent_covariance(
+    of_wctls: wctls.WctlsStudy,
+) -> None:
     for environment in of_wctls.environments:
         one, other = (environment.study.trials[name, "consistent"] for name in ("wtls", "wctls"))
         assert np.allclose(one.errors, other.errors, rtol=0, atol=1e-9)
@@ -156,10 +170,11 @@ def test_the_four_steps_together_are_what_the_library_does_at_once(name: str) ->
             (rho + rng.normal(0, 0.02, len(rho)), theta) for rho, theta in walls_of(room, noise, 60)
         )
         xy, covariance = corner(METHODS[name], (first, second), noise)
-        rows, expected = np.empty((2, LINE_FIELDS)), np.empty(10)
+        rows, expected = np.empty((2, LINE_FIELDS)), np.empty(CORNER_FIELDS)
         for row, wall in zip(rows, (first, second), strict=True):
             line = FITTERS[name].fit(*wall, noise)
-            row[:] = [*line.normal, line.r, *line.covariance_published.flat, *line.covariance_consistent.flat]
+            matrices = line.covariance_published, line.covariance_consistent, line.covariance_map
+            row[:] = [*line.normal, line.r, *np.concatenate([matrix.ravel() for matrix in matrices])]
         intersect(rows[0], rows[1], expected)
         assert np.allclose(xy, expected[:2], rtol=0, atol=1e-12)
         assert np.allclose(covariance.ravel(), expected[2:6], rtol=1e-9, atol=0)
@@ -202,13 +217,13 @@ def test_recordings_that_cannot_be_used_are_refused() -> None:
         recorded(empty, ExtractionSettings(), wctls.FITTERS)
 
 
-ROOMS = Path(__file__).parents[2].parent / "shared" / "data" / "rplidar_csv_rooms"
+GOLF_ROOM = "rplidar_csv_rooms/golf_room.csv.gz"
 ASSUMED = "Assumed, not measured: 50 mm of range noise (--sigma-range) and 3.49 mrad of bearing noise (--sigma-bearing)"
 
 
 @pytest.mark.parametrize("name", ["cwlf", "wctls"])
-def test_a_real_recording_makes_a_report_of_nothing_else(command: Command, name: str) -> None:
-    options = ("--recording", str(ROOMS / "golf_room.csv.gz"), "--scans", "60", "--workers", "1")
+def test_a_real_recording_makes_a_report_of_nothing_else(command: Command, data: Path, name: str) -> None:
+    options = ("--recording", str(data / GOLF_ROOM), "--scans", "60", "--workers", "1")
     number = {"cwlf": 3, "wctls": 7}[name]
     before = re.escape(ASSUMED) + ".*lidarcore calibrate.*\n"
     report = command(name, *options, told=rf"{number} claims of the paper: agree \d+, .*", before=before)
@@ -220,8 +235,8 @@ def test_a_real_recording_makes_a_report_of_nothing_else(command: Command, name:
     )
 
 
-def test_of_noise_that_is_given_nothing_is_assumed(command: Command) -> None:
-    options = ("--recording", str(ROOMS / "golf_room.csv.gz"), "--scans", "60", "--sigma-range", "0.04")
+def test_of_noise_that_is_given_nothing_is_assumed(command: Command, data: Path) -> None:
+    options = ("--recording", str(data / GOLF_ROOM), "--scans", "60", "--sigma-range", "0.04")
     before = re.escape("Assumed, not measured: 3.49 mrad of bearing noise (--sigma-bearing).") + ".*\n"
     assert "of range noise (--sigma-range)" not in command(
         "wctls", *options, told="7 claims.*", before=before

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
+from docs.guide import mixing
+from docs.guide.filters import filtered
+from docs.guide.measurement import MIXED_NOISE
+from docs.guide.views import GATE, SITUATIONS, inside, view
+from docs.guide.wall import WallView, wall_view
 from lidarcore import FITTERS
-from lidarcore.evaluation.consistency import Design, study
-from lidarcore.guide import fusing, mixing
-from lidarcore.guide.filters import filtered
-from lidarcore.guide.measurement import MIXED_NOISE
-from lidarcore.guide.views import GATE, SITUATIONS, inside, view
-from lidarcore.guide.wall import WallView, wall_view
+from lidarcore.evaluation.consistency.study import Design, study
+from lidarcore.geometry import fuse
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +80,7 @@ def test_fusing_is_what_a_kalman_filter_does_one_by_one() -> None:
     A = rng.normal(size=(3, 20, 2, 2))
     claims = A @ A.transpose(0, 1, 3, 2) + 0.1 * np.eye(2)
     errors = rng.normal(size=(3, 20, 2))
-    fused, C = fusing.fuse(errors, claims)
+    fused, C = fuse(errors, claims)
     for p in range(3):
         x, P = errors[p, 0], claims[p, 0]
         for z, R in zip(errors[p, 1:], claims[p, 1:], strict=True):

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lidarcore.guide.measurement import GuideDesign, Measurement, measure
-from lidarcore.guide.page import SOURCES, html
-from lidarcore.guide.text import WORDS, sections
-from lidarcore.guide.values import values
+from docs.guide.measurement import GuideDesign, Measurement, measure
+from docs.guide.page import SOURCES, html
+from docs.guide.text import WORDS, sections
+from docs.guide.values import values
 
 SHIPPED = Path(__file__).parents[2] / "static" / "guide.html"
 CITATION = r"\[(?:(?:CWLF|WCTLS|EKF)(?: [\d-]+,?)*(?:, )?)+\]"

@@ -8,6 +8,7 @@ from scipy.optimize import least_squares, root
 
 from lidarcore import FITTERS, ExtractionSettings, Scan, SensorNoise, compare
 from lidarcore.corners import intersect
+from lidarcore.tables import CORNER_CONSISTENT, CORNER_FIELDS, CORNER_PUBLISHED
 
 NOISES = [SensorNoise(0.05, 0.0035), SensorNoise(0.01, 0.001), SensorNoise(0.003, 0.01)]
 TURNED = [wall.turned(turn) for wall in ROOM_WALLS for turn in (0.0, 0.7, 2.9, -1.6)]
@@ -96,8 +97,9 @@ def test_the_printed_derivatives_of_the_implicit_line_are_right(weighted, wall):
 @each_wall
 @each_noise
 def test_maximum_likelihood_is_what_scipy_finds(wall, noise):
+    """Without latent bearings, that is with their effect on the range to first order."""
     ranges, bearings = measure(wall, noise)
-    line = FITTERS["ml"].fit(ranges, bearings, noise)
+    line = FITTERS["ml"].fit(ranges, bearings, noise, latent_bearings=False)
     (alpha, r), covariance = maximum_likelihood(ranges, bearings, noise, (wall.alpha, wall.r))
     assert angle_between(line.alpha, alpha) == pytest.approx(0, abs=1e-9)
     assert line.r == pytest.approx(r, rel=1e-9)
@@ -143,13 +145,15 @@ def library_corner(first, second):
                 [line.r],
                 line.covariance_published.ravel(),
                 line.covariance_consistent.ravel(),
+                line.covariance_map.ravel(),
             ]
         )
         for line in (first, second)
     ]
-    out = np.empty(13)
+    out = np.empty(CORNER_FIELDS)
     intersect(*rows, out)
-    return out[:2], out[2:6].reshape(2, 2), out[6:10].reshape(2, 2)
+    published, consistent = (out[at : at + 4].reshape(2, 2) for at in (CORNER_PUBLISHED, CORNER_CONSISTENT))
+    return out[:2], published, consistent
 
 
 @each_corner

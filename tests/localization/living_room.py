@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise, extract
-from lidarcore.localization import Landmarks, Navigator, Whereabouts
-from lidarcore.poses import compose, inverse, wrap
+from lidarcore.geometry import compose, inverse, wrap
+from lidarcore.localization import Landmarks, Navigator, TrackingResult
 from lidarcore.scan import Array
 from lidarcore.simulation.paths import ROUND, standing, wandering
 from lidarcore.simulation.people import Person
@@ -60,14 +60,14 @@ def with_odometry(scans: Iterator[Scan], start: Array) -> Iterator[Scan]:
 
 def navigate(
     navigator: Navigator, scans: Iterator[Scan], change: Callable[[int, Scan], Scan] = lambda _, scan: scan
-) -> Iterator[tuple[Scan, Whereabouts]]:
+) -> Iterator[tuple[Scan, TrackingResult]]:
     """Step through the scans, changed if need be."""
     for k, scan in enumerate(scans):
         changed = navigator.deskewed(change(k, scan))
         yield changed, navigator.step(changed, extract(changed, EXTRACTION))
 
 
-def pose_error(where: Whereabouts, truth: Array) -> Array:
+def pose_error(where: TrackingResult, truth: Array) -> Array:
     """(3,) m, m, rad, of the estimate."""
     error = where.estimate.pose - truth
     return np.array([error[0], error[1], wrap(error[2])])

@@ -5,8 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import chi2
 
+from lidarcore.geometry import chi_square_gate, squared_mahalanobis
 from lidarcore.localization import LocalizationSettings
-from lidarcore.localization.association import associate, gate_of, squared_distances, worst_pair
+from lidarcore.localization.ekf.association import associate, worst_pair
 
 SETTINGS = LocalizationSettings()
 GATE, FAR = chi2.ppf([SETTINGS.gate, SETTINGS.new_gate], 2)
@@ -14,14 +15,16 @@ GATE, FAR = chi2.ppf([SETTINGS.gate, SETTINGS.new_gate], 2)
 
 @given(st.floats(0.01, 0.9999), st.integers(1, 40))
 def test_the_gate_is_the_quantile_of_the_chi_square_law(probability: float, dimension: int) -> None:
-    np.testing.assert_allclose(gate_of(probability, dimension), chi2.ppf(probability, dimension), rtol=1e-9)
+    np.testing.assert_allclose(
+        chi_square_gate(probability, dimension), chi2.ppf(probability, dimension), rtol=1e-9
+    )
 
 
 def test_the_gate_lets_through_the_share_of_true_pairs_that_it_names() -> None:
     rng = np.random.default_rng(0)
     S = np.array([[0.04, 0.03], [0.03, 0.09]])
     errors = rng.multivariate_normal([0, 0], S, 100_000, method="cholesky")
-    inside = (squared_distances(errors, S) < gate_of(0.99)).mean()
+    inside = (squared_mahalanobis(errors, S) < chi_square_gate(0.99)).mean()
     assert abs(inside - 0.99) < 4 * np.sqrt(0.99 * 0.01 / 100_000)
 
 

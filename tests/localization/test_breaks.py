@@ -7,9 +7,9 @@ import pytest
 from living_room import EXTRACTION, living_room, navigate, pose_error, room_corners, with_odometry
 
 from lidarcore import Scan, extract
+from lidarcore.geometry import compose, inverse
 from lidarcore.localization import Landmarks, NavigationSettings, Navigator, Points
 from lidarcore.localization.map_origin import MapOrigin
-from lidarcore.poses import compose, inverse
 
 MAP = Points(room_corners(), 1e-6 * np.eye(2))
 LOCALIZE, SLAM = NavigationSettings(mode="localize"), NavigationSettings(mode="slam")
@@ -77,7 +77,7 @@ def test_a_new_map_is_as_uncertain_as_the_pose_at_which_it_is_begun() -> None:
         where = navigator.step(scan, extract(scan, EXTRACTION))
         variances.append(np.diag(where.estimate.covariance))
         messages.append(where.message or "")
-    assert any("a new map is begun" in message for message in messages)
+    assert any("a new map was started" in message for message in messages)
     assert (np.diff(variances, axis=0) >= 0).all()
 
 

@@ -21,7 +21,7 @@ from walks import (
 
 from lidarcore.evaluation.intervals import mean
 from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
-from lidarcore.localization.motion import motion_model
+from lidarcore.localization.ekf.motion import motion_model
 from lidarcore.scan import Array
 
 RUNS, STEPS = 100, 120

@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from lidarcore import Scan, extract
 from lidarcore.errors import LocalizationError
-from lidarcore.localization.deskew import deskew
-from lidarcore.localization.motion_kernels import arc
+from lidarcore.localization.deskewing import deskew
+from lidarcore.localization.ekf.motion_kernels import arc
 from lidarcore.simulation.rooms import rectangular_room
 
 TIMES = np.linspace(0, 0.1, 600)

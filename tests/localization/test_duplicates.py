@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from lidarcore.localization import LocalizationSettings
-from lidarcore.localization.duplicates import find_duplicate
-from lidarcore.localization.joint import JointState
+from lidarcore.localization.ekf.joint import JointState
+from lidarcore.localization.ekf.register import find_duplicate
 
 SETTINGS = LocalizationSettings()
 ONE = np.array([True, False])

@@ -7,11 +7,12 @@ import pytest
 from numpy.typing import NDArray
 from walks import PERIOD, START_COVARIANCE, sight, true_path, walk
 
-from lidarcore.localization import LocalizationSettings, Slam, joint
-from lidarcore.localization.association import Association
-from lidarcore.localization.joint import JointState
-from lidarcore.localization.kalman import Innovation
-from lidarcore.localization.passive import one_thread
+from lidarcore.localization import LocalizationSettings, Slam
+from lidarcore.localization.ekf import joint
+from lidarcore.localization.ekf.association import Association
+from lidarcore.localization.ekf.estimate import Innovation
+from lidarcore.localization.ekf.joint import JointState
+from lidarcore.localization.ekf.passive import one_thread
 from lidarcore.scan import Array, Ints
 
 NOISE = np.array([[4e-4, 1e-4], [1e-4, 9e-4]])

@@ -5,9 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numeric import jacobian
 
-from lidarcore.localization import kernels
-from lidarcore.localization.measurement import to_sensor
-from lidarcore.localization.motion import ConstantVelocity, Motion, OdometryMotion
+from lidarcore.geometry import act_inverse
+from lidarcore.localization.ekf import kernels
+from lidarcore.localization.ekf.motion import ConstantVelocity, Motion, OdometryMotion
 from lidarcore.localization.settings import OdometryNoise, VelocityNoise
 from lidarcore.scan import Array, Ints
 
@@ -37,7 +37,7 @@ def sightings(rng: np.random.Generator, x: Array, count: int) -> tuple[Ints, Arr
         landmarks = np.array(
             [state[r : r + 2] if r >= 0 else m for r, m in zip(rows, given_ones, strict=True)]
         )
-        return to_sensor(state[:3], landmarks.reshape(-1, 2))[0].ravel()
+        return act_inverse(state[:3], landmarks.reshape(-1, 2)).ravel()
 
     return rows, see(x).reshape(-1, 2), jacobian(see, x), 0.01 * covariances(rng, count)
 
@@ -101,20 +101,11 @@ def test_where_landmarks_are_expected_and_how_well(seed: int, landmarks: int) ->
     for k, row in enumerate(rows.tolist()):
 
         def see(state: Array, row: int = row) -> Array:
-            z: Array = to_sensor(state[:3], state[None, row : row + 2])[0][0]
-            return z
+            return act_inverse(state[:3], state[row : row + 2])
 
         H = jacobian(see, x)
         np.testing.assert_allclose(z[k], see(x), atol=1e-12)
         np.testing.assert_allclose(S[k], H @ P @ H.T, atol=1e-7 * (1 + np.abs(S[k]).max()))
-
-
-@given(seeds, st.integers(1, 12))
-def test_the_squared_distance_is_that_of_mahalanobis(seed: int, n: int) -> None:
-    rng = np.random.default_rng(seed)
-    root = rng.normal(size=(n, n))
-    S, nu = root @ root.T + 0.1 * np.eye(n), rng.normal(size=n)
-    np.testing.assert_allclose(kernels.squared_distance(nu, S), nu @ np.linalg.solve(S, nu), rtol=1e-9)
 
 
 @given(seeds, st.integers(0, 6), st.integers(0, 6))

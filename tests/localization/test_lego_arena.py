@@ -26,8 +26,8 @@ import pytest
 from numpy.typing import NDArray
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise, extract, open_recording
+from lidarcore.geometry import compose, inverse
 from lidarcore.localization import LocalizationSettings, Localizer, OdometryNoise, Points, Slam, find_posts
-from lidarcore.poses import compose, inverse
 from lidarcore.scan import Array
 
 FOLDER = "brenner_lego_arena_groundtruth"

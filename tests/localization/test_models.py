@@ -4,9 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numeric import jacobian
 
-from lidarcore.localization.measurement import to_sensor, to_world
-from lidarcore.localization.motion import ConstantVelocity, OdometryMotion, OdometryWithVelocity
-from lidarcore.localization.motion_kernels import arc, move
+from lidarcore.geometry import act_inverse, compose
+from lidarcore.localization.ekf.motion import ConstantVelocity, OdometryMotion, OdometryWithVelocity
+from lidarcore.localization.ekf.motion_kernels import arc
 from lidarcore.localization.settings import OdometryNoise, VelocityNoise
 from lidarcore.scan import Array
 
@@ -31,42 +31,9 @@ def test_the_arc_is_where_many_small_straight_steps_lead(v: float, w: float, dt:
     np.testing.assert_allclose(arc(v, w, dt)[0], [*end, w * dt], atol=1e-6)
 
 
-@given(poses, poses)
-def test_jacobians_of_a_move(pose: Array, increment: Array) -> None:
-    increment[2] = np.clip(increment[2], -0.1, 0.1)  # away from the seam, where a difference is a turn
-    pose[2] = np.clip(pose[2], -2.9, 2.9)
-    _, F, G = move(pose, increment)
-    np.testing.assert_allclose(F, jacobian(lambda p: move(p, increment)[0], pose), atol=1e-6)
-    np.testing.assert_allclose(G, jacobian(lambda u: move(pose, u)[0], increment), atol=1e-6)
-
-
-@given(poses, points)
-def test_jacobians_of_the_measurement(pose: Array, landmark: Array) -> None:
-    _, H_pose, H_landmark = to_sensor(pose, landmark[None])
-    np.testing.assert_allclose(
-        H_pose[0], jacobian(lambda p: to_sensor(p, landmark[None])[0][0], pose), atol=1e-6
-    )
-    np.testing.assert_allclose(
-        H_landmark, jacobian(lambda m: to_sensor(pose, m[None])[0][0], landmark), atol=1e-6
-    )
-
-
-@given(poses, points)
-def test_jacobians_of_a_new_landmark(pose: Array, point: Array) -> None:
-    _, G_pose, G_point = to_world(pose, point[None])
-    np.testing.assert_allclose(G_pose[0], jacobian(lambda p: to_world(p, point[None])[0][0], pose), atol=1e-6)
-    np.testing.assert_allclose(G_point, jacobian(lambda z: to_world(pose, z[None])[0][0], point), atol=1e-6)
-
-
-@given(poses, points)
-def test_a_point_seen_and_placed_again_is_where_it_was(pose: Array, landmark: Array) -> None:
-    seen = to_sensor(pose, landmark[None])[0]
-    np.testing.assert_allclose(to_world(pose, seen)[0][0], landmark, atol=1e-9)
-
-
 @given(poses, points)
 def test_the_measurement_is_range_and_bearing(pose: Array, landmark: Array) -> None:
-    x, y = to_sensor(pose, landmark[None])[0][0]
+    x, y = act_inverse(pose, landmark)
     dx, dy = landmark - pose[:2]
     np.testing.assert_allclose(np.hypot(x, y), np.hypot(dx, dy), atol=1e-9)
     np.testing.assert_allclose(
@@ -126,7 +93,7 @@ def test_an_error_of_odometry_is_one_of_the_pose_and_of_the_velocity(turned: flo
     start = np.array([1.0, 2.0, 0.7, 9.0, 9.0, 9.0])
     _, F, Q = model.predict(start, dt, increment)
     drawn = rng.multivariate_normal(increment, noise.covariance(increment, dt), 100_000, method="cholesky")
-    ends = np.array([move(start[:3], moved)[0] for moved in drawn])
+    ends = compose(start[:3], drawn)
     velocities = drawn[:, [0, 2, 1]] / dt
     changes = rng.normal(size=velocities.shape) * np.sqrt(
         dt * np.square([accelerations.acceleration, accelerations.turn_acceleration, accelerations.sideways])

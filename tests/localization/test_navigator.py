@@ -22,8 +22,8 @@ from scipy.stats import chi2
 from lidarcore import Scan, SensorNoise, extract
 from lidarcore.clusters import cluster
 from lidarcore.errors import CovarianceError, LocalizationError
+from lidarcore.geometry import compose, inverse
 from lidarcore.localization import Landmarks, NavigationSettings, Navigator, Points
-from lidarcore.poses import compose, inverse
 from lidarcore.simulation.posts import Posts
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
@@ -86,7 +86,7 @@ def test_a_break_of_clock_or_odometry_leaves_scans_out_and_then_it_goes_on(case:
             assert before is not None
             assert where.message is not None
             assert where.message.startswith(message)
-            assert where.message.endswith("the scan was left out.")
+            assert where.message.endswith("the scan was skipped.")
             np.testing.assert_array_equal(where.estimate.pose, before.estimate.pose)
             np.testing.assert_array_equal(where.estimate.covariance, before.estimate.covariance)
             assert (len(where.pairs), where.dof, where.nis) == (0, 0, 0.0)
@@ -221,7 +221,7 @@ def test_without_landmarks_a_new_map_is_begun_when_the_pose_is_lost() -> None:
         messages.append(where.message)
         variances.append(where.estimate.covariance[0, 0])
         assert where.state == "starting"
-    assert any(message and "a new map is begun" in message for message in messages)
+    assert any(message and "a new map was started" in message for message in messages)
     assert variances == sorted(variances)  # a new map does not make up for what was lost
 
 

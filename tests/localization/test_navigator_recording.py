@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from lidarcore import extract, open_recording
-from lidarcore.localization import Landmarks, NavigationSettings, Navigator, Whereabouts
-from lidarcore.poses import wrap
+from lidarcore.geometry import wrap
+from lidarcore.localization import Landmarks, NavigationSettings, Navigator, TrackingResult
 
 
-def run(data: Path, navigator: Navigator) -> list[Whereabouts]:
+def run(data: Path, navigator: Navigator) -> list[TrackingResult]:
     recording = open_recording(data / "ccny_hokuyo_rosbag1" / "demo.bag")
     return [navigator.step(scan, extract(navigator.deskewed(scan))) for scan in recording]
 
 
 @pytest.fixture(scope="module")
-def mapped(data: Path) -> list[Whereabouts]:
+def mapped(data: Path) -> list[TrackingResult]:
     return run(data, Navigator(NavigationSettings(mode="slam")))
 
 
-def test_every_corner_is_in_the_map_once(mapped: list[Whereabouts]) -> None:
+def test_every_corner_is_in_the_map_once(mapped: list[TrackingResult]) -> None:
     landmarks = mapped[-1].landmarks
     xy = landmarks.points.xy[landmarks.confirmed]
     apart = np.linalg.norm(xy[:, None] - xy, axis=-1) + 9 * np.eye(len(xy))
@@ -28,7 +28,7 @@ def test_every_corner_is_in_the_map_once(mapped: list[Whereabouts]) -> None:
     assert apart.min() > 0.1
 
 
-def test_it_tracks_all_the_way(mapped: list[Whereabouts]) -> None:
+def test_it_tracks_all_the_way(mapped: list[TrackingResult]) -> None:
     states = [where.state for where in mapped]
     begun = states.index("tracking")
     assert begun < 20
@@ -36,7 +36,7 @@ def test_it_tracks_all_the_way(mapped: list[Whereabouts]) -> None:
 
 
 def test_in_its_own_map_it_finds_itself_from_nothing_and_goes_the_same_way(
-    data: Path, mapped: list[Whereabouts]
+    data: Path, mapped: list[TrackingResult]
 ) -> None:
     final = mapped[-1].landmarks
     known: Landmarks = final.subset(final.confirmed)

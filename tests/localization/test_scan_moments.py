@@ -5,10 +5,10 @@ import pytest
 from living_room import EXTRACTION, living_room, room_corners
 
 from lidarcore import extract
+from lidarcore.geometry import wrap
 from lidarcore.localization import LocalizationSettings, Localizer, Points, deskew
-from lidarcore.localization.deskew import skew
-from lidarcore.localization.moments import corner_times, in_moments, nearest_moments
-from lidarcore.poses import wrap
+from lidarcore.localization.deskewing import skew
+from lidarcore.localization.observations import corner_times, in_moments, nearest_moments
 from lidarcore.scan import Array
 
 MAP = Points(room_corners(), 1e-6 * np.eye(2))

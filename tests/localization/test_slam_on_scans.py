@@ -7,8 +7,8 @@ import pytest
 from scipy.stats import binom, chi2
 
 from lidarcore import extract
+from lidarcore.geometry import compose, inverse, wrap
 from lidarcore.localization import NavigationSettings, Navigator
-from lidarcore.poses import compose, inverse, wrap
 from lidarcore.scan import Array
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings

@@ -5,8 +5,8 @@ import pytest
 from living_room import living_room, navigate, nearest_corners, pose_error
 from scipy.stats import chi2
 
-from lidarcore.localization import LocalizationSettings, NavigationSettings, Navigator, Whereabouts
-from lidarcore.poses import compose, inverse
+from lidarcore.geometry import compose, inverse
+from lidarcore.localization import LocalizationSettings, NavigationSettings, Navigator, TrackingResult
 from lidarcore.scan import Array
 
 SETTINGS = NavigationSettings(mode="slam", filter=LocalizationSettings(unevenness=0.0))
@@ -14,7 +14,7 @@ COUNT = 150
 
 
 @pytest.fixture(scope="module", params=["standing", "moving"])
-def run(request: pytest.FixtureRequest) -> tuple[Array, list[tuple[Array, Whereabouts]]]:
+def run(request: pytest.FixtureRequest) -> tuple[Array, list[tuple[Array, TrackingResult]]]:
     """The start in the room, and after each scan the true pose in the frame that begins there, and the whereabouts."""
     steps = [
         (scan.truth, where)
@@ -26,7 +26,7 @@ def run(request: pytest.FixtureRequest) -> tuple[Array, list[tuple[Array, Wherea
 
 
 def test_every_confirmed_landmark_is_a_corner_of_the_room_and_no_corner_is_there_twice(
-    run: tuple[Array, list[tuple[Array, Whereabouts]]],
+    run: tuple[Array, list[tuple[Array, TrackingResult]]],
 ) -> None:
     start, steps = run
     nearest, errors = nearest_corners(steps[-1][1].landmarks, start)
@@ -35,7 +35,7 @@ def test_every_confirmed_landmark_is_a_corner_of_the_room_and_no_corner_is_there
     assert np.hypot(*errors.T).max() < 0.1
 
 
-def test_the_map_stays(run: tuple[Array, list[tuple[Array, Whereabouts]]]) -> None:
+def test_the_map_stays(run: tuple[Array, list[tuple[Array, TrackingResult]]]) -> None:
     _, steps = run
     confirmed: set[int] = set()
     for _, where in steps:
@@ -45,7 +45,7 @@ def test_the_map_stays(run: tuple[Array, list[tuple[Array, Whereabouts]]]) -> No
 
 
 def test_the_pose_is_off_by_no_more_than_it_claims(
-    run: tuple[Array, list[tuple[Array, Whereabouts]]],
+    run: tuple[Array, list[tuple[Array, TrackingResult]]],
 ) -> None:
     _, steps = run
     errors = np.array([pose_error(where, truth) for truth, where in steps])
@@ -58,7 +58,7 @@ def test_the_pose_is_off_by_no_more_than_it_claims(
 
 
 def test_the_innovations_are_as_large_as_the_filter_expects(
-    run: tuple[Array, list[tuple[Array, Whereabouts]]],
+    run: tuple[Array, list[tuple[Array, TrackingResult]]],
 ) -> None:
     """White accelerations allow for more than this sensor does, so they may be smaller, never larger."""
     _, steps = run
@@ -68,7 +68,7 @@ def test_the_innovations_are_as_large_as_the_filter_expects(
 
 
 def test_it_tracks_from_the_first_confirmed_landmark_on(
-    run: tuple[Array, list[tuple[Array, Whereabouts]]],
+    run: tuple[Array, list[tuple[Array, TrackingResult]]],
 ) -> None:
     states = [where.state for _, where in run[1]]
     begun = states.index("tracking")

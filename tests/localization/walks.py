@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.geometry import compose, inverse
 from lidarcore.localization import LocalizationSettings, Points
-from lidarcore.poses import compose, inverse
 from lidarcore.scan import Array
 from lidarcore.simulation import World
 

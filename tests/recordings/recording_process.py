@@ -9,12 +9,11 @@ import json
 import resource
 import sys
 import time
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
+from lidarcore_app.jobs.recorder import AsyncRecorder
 from recorded_scans import demo
-
-from app.recorder import AsyncRecorder
 
 PERIOD = 0.01  # s
 
@@ -29,12 +28,12 @@ def main(path: Path, how: str, limit: int | None) -> None:
         stamp = time.time()
         recorder.put(replace(scans[number % 5], stamp=stamp))
         print(repr(stamp), flush=True)
-        if recorder.status["state"] == "failed":
+        if recorder.status.state == "failed":
             break
         time.sleep(PERIOD)
     if how == "stalling":
         time.sleep(60)
-    print(json.dumps(recorder.stop()), flush=True)
+    print(json.dumps(asdict(recorder.stop())), flush=True)
     if limit:
         resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         recorder.start(path.with_suffix(".again"))

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from lidarcore_app.sources.library import BUILTIN
 from scipy.io import loadmat, savemat
 
 from lidarcore.errors import RecordingError
@@ -28,14 +29,23 @@ def saved(request, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "scans", "zeros"), [("scans_a", 522, 0.165), ("scans_b", 393, 0.073)])
-def test_matlab_scans_are_those_that_scipy_reads(data, name, scans, zeros):
-    path = data / f"windsor_rplidar_mat/{name}.mat"
+def test_matlab_scans_are_those_that_scipy_reads(shipped, name, scans, zeros):
+    path = shipped / f"windsor_rplidar_mat/{name}.mat"
     truth = loadmat(path)
     assert truth["ranges"].shape == (scans, 420)
     assert np.mean(truth["ranges"] == 0) == pytest.approx(zeros, abs=0.001)
     for scan, ranges in zip(open_recording(path), truth["ranges"], strict=True):
         np.testing.assert_array_equal(scan.ranges, np.where(ranges == 0, np.nan, ranges))
         np.testing.assert_array_equal(scan.bearings, truth["angles"][0])
+
+
+def test_the_demo_of_a_real_sensor_is_a_piece_of_its_recording(shipped):
+    demo = next(path for path in BUILTIN if path.suffix == ".npz")
+    piece = list(open_recording(shipped / "windsor_rplidar_mat/scans_a.mat"))[100:300]
+    for scan, original in zip(open_recording(demo), piece, strict=True):
+        np.testing.assert_allclose(scan.ranges, original.ranges, rtol=1e-7)
+        np.testing.assert_array_equal(scan.bearings, original.bearings)
+    assert "Sooraj Sunil" in (demo.parent / "LICENSE-windsor.txt").read_text()
 
 
 def test_all_columns_arrive(saved):

@@ -9,13 +9,14 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from captures import read_capture
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from recorded_scans import dense_stream
 
 from lidarcore import open_recording
 from lidarcore.errors import RecordingError
-from lidarcore.rplidar.capture import CaptureWriter, Stream, read_capture, read_pieces, read_stream
+from lidarcore.rplidar.capture import CaptureWriter, Stream, read_pieces, read_stream
 from lidarcore.rplidar.driver import Driver
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.rplidar.listener import Listener

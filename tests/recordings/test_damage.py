@@ -10,6 +10,7 @@ from backports import zstd
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import CompressionType
+from real_recordings import where
 from recorded_scans import demo, dense_stream
 from ros_writers import drive, write_bag1, write_mcap
 from scipy.io import savemat
@@ -55,7 +56,7 @@ def samples(data, tmp_path_factory):
     (folder / "dump.txt").write_bytes(
         3 * (data / "rplidar_raw_serial_hex/frame_grabber_Data.txt").read_bytes()
     )
-    (folder / "points.json").write_bytes((data / "tau_rplidar_c1_rooms/lab446__scans.json").read_bytes())
+    (folder / "points.json").write_bytes(where("tau_rplidar_c1_rooms/lab446__scans.json").read_bytes())
     arrays = {"ranges": np.random.default_rng(0).uniform(1, 9, (40, 90)), "bearings": np.linspace(-3, 3, 90)}
     savemat(folder / "plain.mat", arrays)
     savemat(folder / "packed.mat", arrays, do_compression=True)

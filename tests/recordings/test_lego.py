@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise, extract, open_recording
-from lidarcore.poses import compose, inverse
+from lidarcore.geometry import compose, inverse
 
 FOLDER = "brenner_lego_arena_groundtruth"
 

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from real_recordings import each, where
 
 from lidarcore.errors import RecordingError, TopicError
+from lidarcore.files.streams import read_head
 from lidarcore.recordings import FORMATS, open_recording
-from lidarcore.recordings.streams import read_head
 
 RECORDINGS = {
     "brenner_lego_arena_groundtruth/robot4_scan.txt": "LEGO robot log",
@@ -42,19 +43,38 @@ RECORDINGS = {
 }
 
 
-def test_every_file_is_of_one_format_or_none(data):
-    paths = [path for path in data.rglob("*") if path.is_file()] + [data / name for name in RECORDINGS]
-    for path in paths:
-        head = b"" if path.is_dir() else read_head(path)
-        found = [format_.name for format_ in FORMATS if format_.recognises(path, head)]
-        expected = RECORDINGS.get(str(path.relative_to(data)))
-        assert found == ([expected] if expected else []), path
+OTHERS = [
+    "brenner_lego_arena_groundtruth/robot_arena_landmarks.txt",
+    "brenner_lego_arena_groundtruth/robot4_motors.txt",
+    "intel_odometry_groundtruth/intel.relations.gz",
+    "tau_rplidar_c1_rooms/LICENSE",
+    "tau_rplidar_c1_rooms/NOTE.txt",
+    "tau_rplidar_c1_rooms/lab446__circle1.json",
+    "tau_rplidar_c1_rooms/lab446__transforms.json",
+    "turtlebot4_rplidar_rosbag2/mac_1st_floor_final.pgm.gz",
+    "turtlebot4_rplidar_rosbag2/macfirst_floor_take_2/metadata.yaml",
+]
 
 
-@pytest.mark.parametrize("name", RECORDINGS)
-def test_every_recording_yields_the_same_sound_scans_each_time(data, name):
+def formats_of(path):
+    head = b"" if path.is_dir() else read_head(path)
+    return [format_.name for format_ in FORMATS if format_.recognises(path, head)]
+
+
+@pytest.mark.parametrize("name", each(RECORDINGS))
+def test_a_recording_is_of_one_format(name):
+    assert formats_of(where(name)) == [RECORDINGS[name]]
+
+
+@pytest.mark.parametrize("name", each(OTHERS))
+def test_what_lies_beside_recordings_is_of_none(name):
+    assert formats_of(where(name)) == []
+
+
+@pytest.mark.parametrize("name", each(RECORDINGS))
+def test_every_recording_yields_the_same_sound_scans_each_time(name):
     topic = "dev1" if name.endswith(".json") else None
-    recording = open_recording(data / name, topic)
+    recording = open_recording(where(name), topic)
     first = list(recording)
     notes = recording.notes
     again = list(recording)
@@ -75,13 +95,13 @@ def test_content_decides_not_the_name(data, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in RECORDINGS if "rosbag2" not in name and not name.endswith("gz")]
+    "name", each(name for name in RECORDINGS if "rosbag2" not in name and not name.endswith("gz"))
 )
-def test_packed_files_read_as_the_unpacked(data, tmp_path, name):
+def test_packed_files_read_as_the_unpacked(tmp_path, name):
     packed = tmp_path / "packed"
-    packed.write_bytes(gzip.compress((data / name).read_bytes(), 1))
+    packed.write_bytes(gzip.compress(where(name).read_bytes(), 1))
     topic = "dev1" if name.endswith(".json") else None
-    for scan, other in zip(open_recording(packed, topic), open_recording(data / name, topic), strict=True):
+    for scan, other in zip(open_recording(packed, topic), open_recording(where(name), topic), strict=True):
         np.testing.assert_array_equal(scan.ranges, other.ranges)
         np.testing.assert_array_equal(scan.bearings, other.bearings)
 
@@ -121,8 +141,8 @@ def test_the_error_for_an_unknown_file_lists_the_formats(tmp_path):
     assert all(format_.name in str(caught.value) for format_ in FORMATS)
 
 
-def test_of_several_lidars_one_must_be_chosen(data):
-    path = data / "tau_rplidar_c1_rooms/lab446__scans.json"
+def test_of_several_lidars_one_must_be_chosen(shipped):
+    path = shipped / "tau_rplidar_c1_rooms/lab446__scans.json"
     with pytest.raises(TopicError) as caught:
         open_recording(path)
     assert caught.value.topics == ("dev1", "dev2", "dev3", "dev4", "dev5")
@@ -131,13 +151,13 @@ def test_of_several_lidars_one_must_be_chosen(data):
         open_recording(path, "dev9")
 
 
-def test_a_topic_is_refused_where_there_are_none(data):
+def test_a_topic_is_refused_where_there_are_none(shipped):
     with pytest.raises(TopicError, match="no topics"):
-        open_recording(data / "windsor_rplidar_mat/scans_a.mat", "/scan")
+        open_recording(shipped / "windsor_rplidar_mat/scans_a.mat", "/scan")
 
 
-def test_point_sets_keep_their_points(data):
-    path = data / "tau_rplidar_c1_rooms/lab446__scans.json"
+def test_point_sets_keep_their_points(shipped):
+    path = shipped / "tau_rplidar_c1_rooms/lab446__scans.json"
     points = np.array(json.loads(path.read_text())["dev2"])
     (scan,) = open_recording(path, "dev2")
     found, expected = (np.array(sorted(map(tuple, xy))) for xy in (scan.xy, points))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lidarcore import Scan, open_recording
-from lidarcore.poses import compose, inverse
+from lidarcore.geometry import compose, inverse
 from lidarcore.scan import Array
 
 TICK = 0.90 * np.pi * 58.2e-3 / (1000 / 3)

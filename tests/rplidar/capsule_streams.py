@@ -71,6 +71,11 @@ def errors_mm(angles_q16, which, source: Stream) -> np.ndarray:
     return np.abs(np.radians(away)) * FARTHEST
 
 
+def z_q14(revolution) -> np.ndarray:
+    """(N,) the angles as Slamtec's SDK gives them: 1/16384 of a right angle."""
+    return ((revolution.angles >> 10) << 8) // 90
+
+
 def slamtec_dense(capsules):
     """(angle in 1/65536 deg, z_q14, dist_q2) of each node as Slamtec's SDK 2.1 computes them, integer for integer."""
     nodes, previous = [], None

@@ -12,13 +12,13 @@ from itertools import islice
 
 import pytest
 import typer
+from lidarcore_app.cli.devices import ADVICE, devices, sensor_at
 from serial import Serial
 from serial.tools.list_ports import comports
 from serial.tools.list_ports_common import ListPortInfo
 from typer.testing import CliRunner
 from waiting import PATIENCE
 
-from app.cli_devices import ADVICE, devices, sensor_at
 from lidarcore.errors import NoDeviceError
 from lidarcore.rplidar import Driver, find_devices
 from lidarcore.rplidar.connection.devices import only_device

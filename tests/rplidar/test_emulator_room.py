@@ -16,7 +16,8 @@ from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.simulation import furnished_room
 from lidarcore.simulation.paths import ROUND, standing, wandering
 
-EXACT = {"people": 0, "sigma_range": 1e-6, "sigma_bearing": 1e-6, "mixed": 0, "dropouts": 0, "jitter": 0}
+EXACT = {"people": 0, "sigma_range": 1e-6, "sigma_bearing": 1e-6, "range_growth": 0, "unevenness": 0}
+EXACT |= {"mixed": 0, "dropouts": 0, "jitter": 0}
 
 
 def truth(angles, path=standing, time=0.0):

@@ -13,6 +13,7 @@ import tty
 from contextlib import contextmanager
 from pathlib import Path
 
+import capsule_streams as cs
 import numpy as np
 import rplidar
 import serial
@@ -61,7 +62,7 @@ def decoded(heard, descriptor, answer, us_per_sample):
 
 def returns(revolutions):
     """Angles (1/16384 of a right angle) and distances (1/4 mm) of all samples that returned, one after the other."""
-    z = np.concatenate([revolution.z_q14 for revolution in revolutions])
+    z = np.concatenate([cs.z_q14(revolution) for revolution in revolutions])
     distances = np.concatenate([revolution.distances for revolution in revolutions])
     return np.stack([z, distances], -1)[distances > 0]
 

@@ -31,7 +31,7 @@ def test_every_node_is_that_of_slamtecs_decoder(rpm) -> None:
     revolutions = cs.decoded(dec, source)
     theirs = cs.slamtec_dense(source.capsules)
     front = int(np.flatnonzero(np.diff(theirs[:, 0]) < 0)[0]) + 1
-    columns = [(r.angles, r.z_q14, r.distances) for r in revolutions]
+    columns = [(r.angles, cs.z_q14(r), r.distances) for r in revolutions]
     ours = np.concatenate([np.stack(column, -1) for column in columns])
     np.testing.assert_array_equal(ours, theirs[front : front + len(ours)])
     assert len(revolutions) == int(source.angles[-41] // 360) - 1
@@ -45,8 +45,8 @@ def test_the_golden_pair() -> None:
     later = [cs.capsule((22400 + 992 * i) % 23040, [3000] * 40) for i in range(2, 28)]
     revolution = decoder().feed(b"".join([first, second, *later]), 1.0)[0]
     assert first[:8].hex() == "a75580d7e803e903"
-    assert (revolution.angles[0] >> 10, revolution.z_q14[0], revolution.distances[0]) == (4, 11, 1026 * 4)
-    assert (revolution.angles[13] >> 10, revolution.z_q14[13], revolution.distances[13]) == (
+    assert (revolution.angles[0] >> 10, cs.z_q14(revolution)[0], revolution.distances[0]) == (4, 11, 1026 * 4)
+    assert (revolution.angles[13] >> 10, cs.z_q14(revolution)[13], revolution.distances[13]) == (
         327,
         930,
         1039 * 4,

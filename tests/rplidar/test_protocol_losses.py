@@ -184,20 +184,6 @@ def test_a_reader_that_was_away_loses_nothing_if_the_buffer_held() -> None:
     assert (np.diff(which) == 1).all()
 
 
-def test_after_a_break_nothing_of_before_is_used() -> None:
-    before, after = cs.stream(140), cs.stream(200, first_deg=123.0)
-    dec = decoder()
-    cs.decoded(dec, before)
-    dec.feed(before.capsules[0][:50], before.arrivals[-1])
-    dec.break_()
-    revolutions = cs.decoded(dec, after, arrivals=after.arrivals + before.arrivals[-1])
-    which = np.concatenate([cs.numbers(r) for r in revolutions])
-    assert cs.errors_mm(np.concatenate([r.angles for r in revolutions]), which, after).max() < 60
-    assert (np.diff(which) == 1).all()
-    assert after.angles[which[0]] == pytest.approx(360, abs=0.41)
-    assert all(r.complete for r in revolutions)
-
-
 def test_a_restart_that_the_sensor_announces_begins_anew() -> None:
     source, again = cs.stream(150), cs.stream(150, first_deg=200.0)
     revolutions = decoder().feed(source.data + again.data, 1.0)

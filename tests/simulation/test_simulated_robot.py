@@ -9,8 +9,8 @@ from scipy.stats import chi2, norm
 
 from lidarcore import Scan, SensorNoise
 from lidarcore.errors import SimulationError
+from lidarcore.geometry import compose, inverse, wrap
 from lidarcore.localization import OdometryNoise
-from lidarcore.poses import compose, inverse, wrap
 from lidarcore.simulation.posts import scattered
 from lidarcore.simulation.robot import RATE, SimulatedRobot
 from lidarcore.simulation.settings import OdometryError, SimulationSettings

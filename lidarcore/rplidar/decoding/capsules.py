@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 from lidarcore.rplidar.answers import Answer
 from lidarcore.rplidar.decoding.clock import SampleClock
-from lidarcore.rplidar.decoding.contents import DECODERS
 from lidarcore.rplidar.decoding.counts import Counts
 from lidarcore.rplidar.decoding.packets import FORMATS
+from lidarcore.rplidar.decoding.payloads import DECODERS
 from lidarcore.rplidar.decoding.turns import TURN_Q8, Sweep, Turns
 
 RESTARTED = 1 << 15  # bit of the start angle: first capsule of a scan, or the sensor lost its angle
@@ -55,7 +55,7 @@ class CapsuleSequence:
         self.restart()
 
     def restart(self) -> None:
-        """The stream begins anew, anywhere."""
+        """Forget the stream so far: the next capsule has nothing to do with it."""
         self._previous: Capsule | None = None
         self._doubtful: Sweep | None = None
         self._forget()

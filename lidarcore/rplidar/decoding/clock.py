@@ -27,7 +27,7 @@ class SampleClock:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: samples are not known to be evenly spaced with those before."""
+        """Forget earlier samples: the next are not known to be evenly spaced with them."""
         self._before = self._now = self._zero = _CALM  # lowest of the last window, of this one, of both
         self._began, self._newest = -_CALM, 0
 

@@ -49,11 +49,6 @@ class StreamDecoder:
             self._sequence.add(skipped, packets, arrival, behind)
         return self._take()
 
-    def break_(self) -> None:
-        """The stream was interrupted, and what comes next has nothing to do with what came before."""
-        self._finder.reset()
-        self._sequence.restart()
-
     def _take(self) -> list[Revolution]:
         completed = self._sequence.completed
         revolutions = completed.copy()

@@ -1,7 +1,8 @@
 """Nodes, each with an angle of its own, cut into revolutions where they say that one starts.
 
-Legacy nodes (5 bytes) have no checksum: one whose angle leaps away and back is left out, and where the node that
-starts a revolution was lost, the angle says so instead.
+Legacy nodes (5 bytes) have no checksum: one whose angle leaps away and back, or is out of the order and spacing of the
+turn, is left out, and where the node that starts a revolution was lost, the angle says so instead. Of nodes that never
+came the spacing tells, too. Distances have nothing to be judged by.
 """
 
 from collections.abc import Callable
@@ -14,6 +15,7 @@ from lidarcore.rplidar.decoding.clock import SampleClock
 from lidarcore.rplidar.decoding.counts import Counts
 from lidarcore.rplidar.decoding.packets import FORMATS
 from lidarcore.rplidar.decoding.revolution import TURN, Revolution
+from lidarcore.rplidar.decoding.spacing import misfits, missing
 from lidarcore.scan import Ints
 
 DEGREE = 1 << 16
@@ -74,11 +76,6 @@ class NodeSequence:
         self._nodes = _NONE  # of the present turn; the newest `_waiting` of them may leap
         self._waiting = 0
         self._begun = self._at_front = False  # the present turn is to be given out; it began at the front
-
-    def restart(self) -> None:
-        """The stream begins anew, anywhere."""
-        self._clock.reset()
-        self._forget()
 
     def _forget(self) -> None:
         """Leave out what is there, and what comes before the next start."""
@@ -165,16 +162,37 @@ class NodeSequence:
         if not self._begun:
             self._counts.partial_samples += end
         elif end:
+            nodes = self._sound(nodes)
             angles, distances, quality, _, indices, after_loss = nodes
-            gaps = _gaps(self._turned(angles), after_loss > 0)
+            turned = self._turned(angles)
+            gaps = _gaps(turned, after_loss > 0)
+            if self._format.samples == 1:
+                gaps = _joined(gaps, missing(turned))
             times = self._clock.times(indices)
             revolution = Revolution(angles, distances, times, quality.astype(np.uint8), gaps, arrival)
             self.completed.append(revolution)
+
+    def _sound(self, nodes: Nodes) -> Nodes:
+        """Those whose angle fits the spacing of the turn, if that is all there is to judge them by."""
+        if self._format.samples > 1:
+            return nodes
+        wrong = misfits(self._turned(nodes[ANGLE])) & (
+            nodes[DISTANCE] > 0
+        )  # where nothing returned, nothing is bent
+        self._counts.drop("unfit_packets", int(wrong.sum()))
+        return nodes[:, ~wrong]
 
 
 def _signed(angles: Ints) -> Ints:
     """The same angles, from minus half a turn to half a turn."""
     return (angles + TURN // 2) % TURN - TURN // 2
+
+
+def _joined(gaps: Ints, more: Ints) -> Ints:
+    """Both, in order; without what lies within one that is there."""
+    new = [(begin, end) for begin, end in more if not ((gaps[:, 0] <= begin) & (end <= gaps[:, 1])).any()]
+    joined = np.concatenate([gaps, np.array(new, np.int64).reshape(-1, 2)]).clip(0, TURN)
+    return joined[np.argsort(joined[:, 0], kind="stable")]
 
 
 def _gaps(turned: Ints, after_loss: NDArray[np.bool_]) -> Ints:

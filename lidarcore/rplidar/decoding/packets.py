@@ -40,13 +40,7 @@ class PacketFinder:
 
     def __init__(self, layout: Format, counts: Counts) -> None:
         self._format, self._counts = layout, counts
-        self._buffer = b""
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget what is incomplete; a stream begins with a packet."""
-        self._counts.drop("garbage_bytes", len(self._buffer))
-        self._buffer, self._skipped, self._in_step = b"", 0, True
+        self._buffer, self._skipped, self._in_step = b"", 0, True  # a stream begins with a packet
 
     @property
     def waiting(self) -> int:

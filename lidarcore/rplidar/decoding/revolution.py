@@ -37,14 +37,8 @@ class Revolution:
         """Nothing of the turn was lost."""
         return not len(self.gaps)
 
-    @property
-    def z_q14(self) -> Ints:
-        """(N,) the angles as Slamtec's SDK gives them: 1/16384 of a right angle."""
-        z: Ints = ((self.angles >> 10) << 8) // 90
-        return z
-
     def scan(self, stamp_offset: float = 0.0) -> Scan:
-        """The same as a Scan: metres, radians counter-clockwise, its stamp that of the sample measured first.
+        """This revolution as a Scan: metres, radians counter-clockwise, its stamp that of the sample measured first.
 
         stamp_offset  s, added to the stamp: from the clock of `arrival` to Unix time
         """

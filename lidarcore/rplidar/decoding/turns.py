@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.rplidar.decoding.clock import SampleClock
-from lidarcore.rplidar.decoding.contents import Decoder
 from lidarcore.rplidar.decoding.counts import Counts
+from lidarcore.rplidar.decoding.payloads import Decoder
 from lidarcore.rplidar.decoding.revolution import TURN, Revolution
 from lidarcore.scan import Ints
 

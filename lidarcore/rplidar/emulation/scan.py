@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.noise import SensorNoise
 from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.rplidar.protocol import Answer, ScanMode, encode_dense, encode_nodes
 from lidarcore.scan import Array
@@ -73,11 +72,13 @@ class Room:
 
 def furnished(options: EmulatorOptions, rng: np.random.Generator, now: float) -> Room:
     """The furnished room with people in it, from now on."""
-    world, path = furnished_room(), wandering if options.moving else standing
+    world, path = (
+        furnished_room().uneven(options.noise, options.seed),
+        wandering if options.moving else standing,
+    )
     way = path(np.linspace(0, 2 * ROUND, 100))[:, :2]
     people = [Person(world, rng, way) for _ in range(options.people)]
-    noise = SensorNoise(options.sigma_range, options.sigma_bearing)
-    optics = Optics(noise, options.mixed, options.dropouts)
+    optics = Optics(options.noise, options.mixed, options.dropouts)
     room = Room(Scene(world, path, people), optics, rng, now)
     room.measure(np.full(1, now), np.zeros(1))  # compiles what casts the beams, before anyone waits for it
     return room

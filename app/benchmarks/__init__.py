@@ -1,0 +1,1 @@
+"""What `lidarcore bench` measures of the running server."""

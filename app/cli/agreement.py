@@ -1,0 +1,85 @@
+"""The command `lidarcore evaluate agreement`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import Set, SettingsFile, check_folder, counting, settings_from
+from .stations import named_stations
+
+if TYPE_CHECKING:
+    from lidarcore.evaluation.stations.agreement_study import Agreement
+
+
+def agreement(
+    recordings: Annotated[
+        list[Path], typer.Argument(help="recordings of a sensor that stood still at several places")
+    ],
+    given: Annotated[
+        bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
+    ] = False,
+    by_pair: Annotated[bool, typer.Option("--by-pair", help="a line for each pair of stations, too")] = False,
+    topic: Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="FILE.json with the figures of every pair")
+    ] = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+) -> None:
+    """The same walls and corners from neighbouring stations: do they differ by as much as is claimed?
+
+    What a sensor does wrong in every scan from one place shows only here. It is told by one half of the pairs of
+    stations, and judged on the other.
+    """
+    from dataclasses import asdict
+    from json import dumps
+
+    from rich.console import Console
+    from rich.table import Table
+
+    from lidarcore import files
+    from lidarcore.evaluation.consistency import tables as consistency_tables
+    from lidarcore.evaluation.repeatability.tables import finite
+    from lidarcore.evaluation.stations.agreement_study import study
+
+    if output is not None:
+        consistency_tables.check(output, (".json",))
+        check_folder(output)
+    extraction = settings_from(settings, set_).extraction
+    with counting("pairs of stations") as tell:
+        found = study(named_stations(recordings, topic), extraction, calibrated=not given, tell=tell)
+    table = Table(title="Differences between neighbouring stations", title_justify="left")
+    for heading in (
+        "claims",
+        "systematic part, mm",
+        "walls in 95 %",
+        "lowest, highest pair",
+        "corners in 95 %",
+    ):
+        table.add_column(heading)
+    table.add_row("consistent", *_cells(found.consistent))
+    table.add_row("map", *_cells(found.map))
+    table.add_row("map, with a systematic part", *_cells(found.systematic))
+    console = Console()
+    console.print(table)
+    console.print(
+        f"{found.map.differences:,} differences of walls between {len(found.map.pairs)} pairs of stations."
+    )
+    if by_pair:
+        for name, held in found.systematic.pairs.items():
+            console.print(f"{name:40} {found.map.pairs[name]:.3f} {held:.3f}")
+    if output is not None:
+        files.write(output, dumps(finite(asdict(found)), indent=1, allow_nan=False) + "\n")
+
+
+def _cells(found: "Agreement") -> tuple[str, str, str, str]:
+    parts = ", ".join(f"{1e3 * part:.1f}" for part in found.systematic)
+    shares = found.pairs.values()
+    walls, corners = found.walls, found.corners
+    return (
+        parts,
+        f"{walls.value:.3f} ({walls.low:.3f}–{walls.high:.3f})",
+        f"{min(shares):.2f}, {max(shares):.2f}",
+        "too few" if corners.value != corners.value else f"{corners.value:.3f}",
+    )

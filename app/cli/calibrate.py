@@ -1,0 +1,135 @@
+"""The command `lidarcore calibrate`."""
+
+import math
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import RecordingPath, SettingsFile, Topic, check_folder, settings_from
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
+    from lidarcore import SensorNoise
+    from lidarcore.evaluation.calibration.calibrate import Calibration
+    from lidarcore.evaluation.intervals import Interval
+
+    from ..jobs.calibration_report import BandsReport, CalibrationReport
+
+DEGREES = math.degrees(1)
+
+
+def calibrate(
+    recording: RecordingPath,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="FILE.json for the noise, to be given to others as --settings"),
+    ] = None,
+    skip: Annotated[int, typer.Option(min=0, help="scans to leave out at the beginning")] = 0,
+    scans: Annotated[
+        int | None, typer.Option(min=1, help="scans to take, 100 suffice; all if not given")
+    ] = None,
+    topic: Topic = None,
+    settings: SettingsFile = None,
+    json: Annotated[
+        bool, typer.Option("--json", help="all of it as JSON instead of a table, m and rad")
+    ] = False,
+) -> None:
+    """Measure the noise of a sensor from a recording in which it stands still in a room.
+
+    Where one of its two numbers cannot be told, the file keeps that of --settings, or the default.
+    """
+    from pydantic import TypeAdapter
+    from rich.console import Console
+
+    from lidarcore import open_recording
+    from lidarcore.evaluation.calibration.calibrate import calibrate as run
+    from lidarcore.evaluation.consistency import tables as consistency_tables
+
+    from ..jobs.calibration_report import CalibrationReport, report
+
+    if output is not None:
+        consistency_tables.check(output, (".json",))
+        check_folder(output)
+    usual = settings_from(settings, None).extraction.noise
+    result = run(islice(open_recording(recording, topic), skip, None if scans is None else skip + scans))
+    found = report(result)
+    if json:
+        typer.echo(TypeAdapter(CalibrationReport).dump_json(found, indent=1))
+    else:
+        _show(Console(), found)
+    if output is not None:
+        _write(output, result, usual)
+
+
+def _write(output: Path, result: "Calibration", usual: "SensorNoise") -> None:
+    from lidarcore import files
+    from lidarcore.errors import EvaluationError
+
+    from ..jobs.profiles import Profile
+
+    noise = result.noise_or(usual)
+    kept = [
+        f"{name} {1e3 * getattr(noise, name):g} {unit}"
+        for name, unit, told in zip(
+            ("sigma_range", "sigma_bearing"),
+            ("mm", "mrad"),
+            (result.told["sigma_range"], result.told["sigma_bearing"]),
+            strict=True,
+        )
+        if told is None
+    ]
+    if len(kept) == 2:
+        raise EvaluationError(f"Neither noise can be determined here, so {output} is not written.")
+    files.write(output, Profile.of(noise).text)
+    if kept:
+        typer.echo(f"{output} keeps {kept[0]} of the settings: it cannot be determined here.", err=True)
+
+
+def _show(console: "Console", found: "CalibrationReport") -> None:
+    console.print(_table(found))
+    console.print(
+        f"{found.beams:,} beams on {found.walls} walls; outliers {_text(found.outliers, 100)} %; the wall "
+        f"that drifted most did so by {1e3 * found.drift:.1f} mm. Intervals are of 95 % confidence."
+    )
+    for remark in found.remarks:
+        console.print(remark)
+
+
+def _table(found: "CalibrationReport") -> "Table":
+    from rich.table import Table
+
+    table = Table("", "", "95 %")
+    table.add_row("sigma_bearing, mrad", *_known(found.sigma_bearing))
+    table.add_row("sigma_range, mm", *_known(found.sigma_range))
+    _add_bands(table, "range", found.by_range, 1.0, "m")
+    _add_bands(table, "incidence", found.by_incidence, DEGREES, "°")
+    table.add_section()
+    table.add_row("range bias, mm", *_cells(found.range_bias))
+    table.add_row("alignment, °", *_cells(found.alignment, DEGREES))
+    return table
+
+
+def _add_bands(table: "Table", title: str, bands: "BandsReport", factor: float, unit: str) -> None:
+    table.add_section()
+    verdict = "differs" if bands.differs else "the same"
+    table.add_row(f"sigma_range by {title}, mm", verdict, f"p = {bands.p_value:.2g}")
+    for low, high, sigma in zip(bands.edges[:-1], bands.edges[1:], bands.sigmas, strict=True):
+        table.add_row(f"  {factor * low:.2f} to {factor * high:.2f} {unit}", *_known(sigma))
+
+
+def _known(sigma: "Interval") -> tuple[str, str]:
+    return _cells(sigma) if sigma.low > 0 else ("unknown", f"at most {1e3 * sigma.high:.2f}")
+
+
+def _cells(figure: "Interval | None", factor: float = 1e3) -> tuple[str, str]:
+    if figure is None:
+        return "unknown", ""
+    return f"{factor * figure.value:.2f}", f"{factor * figure.low:.2f} to {factor * figure.high:.2f}"
+
+
+def _text(figure: "Interval", factor: float) -> str:
+    return f"{factor * figure.value:.2f} ({factor * figure.low:.2f} to {factor * figure.high:.2f})"

@@ -1,0 +1,196 @@
+"""The command `lidarcore evaluate`: what each method claims, and what is so."""
+
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .agreement import agreement
+from .evaluate_map import evaluate_map
+from .map_studies import relocation, walls
+from .options import RecordingPath, Seed, Set, SettingsFile, Topic, Workers, check_folder, settings_from
+from .progress import ForPrograms, progress
+from .stations import stations
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from lidarcore import SensorNoise
+    from lidarcore.evaluation.consistency.study import Consistency
+
+WIDTH = 180  # of the tables in a file or a pipe
+MOVES = (
+    "The sensor moves in this recording: nothing can be judged. It should stand still in a room; "
+    "--skip and --scans choose a part in which it does."
+)
+
+evaluate = typer.Typer(
+    help="Judge ellipses and maps: what is claimed against what is measured.", no_args_is_help=True
+)
+evaluate.command("map")(evaluate_map)
+
+
+Rooms = Annotated[
+    list[str] | None,
+    typer.Option(help="a simulated world, or a rectangle in m such as 4.5x2.5; may be repeated"),
+]
+Noises = Annotated[
+    list[str] | None,
+    typer.Option(metavar="RANGE,BEARING", help="sigmas in m and rad, e.g. 0.02,0.0034; may be repeated"),
+]
+Segments = Annotated[str, typer.Option(help="known, found (by the real segmentation), or both")]
+Trials = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        help="corner trials in all, each by every method; "
+        "rounded up to whole blocks for each room, noise and segmentation",
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="a Dask scheduler, e.g. tcp://host:8786, whose workers do the work"),
+]
+StudyOutput = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", help="FILE.html for a report; FILE.json or FILE.csv with every figure"),
+]
+
+
+@evaluate.command()
+def consistency(
+    room: Rooms = None,
+    noise: Noises = None,
+    segments: Segments = "both",
+    trials: Trials = 100_000,
+    beams: Annotated[int, typer.Option(min=90, help="beams in a revolution")] = 920,
+    seed: Seed = 0,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    output: StudyOutput = None,
+    by_room: Annotated[bool, typer.Option("--by-room", help="a table for each room, too")] = False,
+    for_programs: ForPrograms = False,
+) -> None:
+    """Bias, RMS error, coverage, ANEES and ellipse areas of every fitter with both covariances."""
+    from lidarcore.evaluation.consistency import study as monte_carlo
+    from lidarcore.evaluation.consistency import tables as consistency_tables
+    from lidarcore.evaluation.consistency.trials import SEGMENTATIONS
+
+    if output is not None:  # told before minutes of work are lost
+        consistency_tables.check(output, consistency_tables.STUDY_FORMATS)
+        check_folder(output)
+    if segments not in (*SEGMENTATIONS, "both"):
+        raise typer.BadParameter("--segments is known, found or both.")
+    usual = monte_carlo.Design()
+    design = monte_carlo.Design(
+        rooms=tuple(room or usual.rooms),
+        noises=tuple(map(_noise, noise)) if noise else usual.noises,
+        segmentations=tuple(s for s in SEGMENTATIONS if segments in (s, "both")),
+        trials=trials,
+        beams=beams,
+        seed=seed,
+    )
+    started = time.perf_counter()
+    with progress(design.chunks, for_programs) as tell, _interruptible():
+        study = monte_carlo.study(
+            design, workers or os.cpu_count() or 1, scheduler, lambda done, chunks: tell(done)
+        )
+    _show(study, by_room, time.perf_counter() - started)
+    if output is not None:
+        consistency_tables.write(study, output)
+
+
+def _show(study: "Consistency", by_room: bool, seconds: float) -> None:
+    from lidarcore import FITTERS
+
+    from .consistency_table import tables
+
+    console = _console()
+    for table in tables(study, by_room):
+        console.print(table)
+    console.print(
+        f"{study.trials:,} corner trials, each by {len(FITTERS)} fitters, in {seconds:.1f} s. "
+        "± is half of a 95 % confidence interval; area: of the claimed ellipse over the actual one."
+    )
+
+
+def _console() -> "Console":
+    """The terminal; a file or a pipe is as wide as the tables need."""
+    from rich.console import Console
+
+    console = Console()
+    return console if console.is_terminal else Console(width=WIDTH)
+
+
+@evaluate.command()
+def repeatability(
+    recording: RecordingPath,
+    scans: Annotated[int, typer.Option(min=10, help="in the window; as many are read")] = 100,
+    skip: Annotated[int, typer.Option(min=0, help="scans to leave out at the beginning")] = 0,
+    methods: Annotated[
+        str | None, typer.Option(metavar="NAME,...", help="fitters to compare; all if not given")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="FILE.json with every corner and wall, or FILE.csv")
+    ] = None,
+    topic: Topic = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+) -> None:
+    """The scatter of walls and corners against the ellipse each method claims, while the sensor stood still."""
+    from lidarcore import FITTERS, compare, open_recording
+    from lidarcore.errors import EvaluationError
+    from lidarcore.evaluation.consistency import tables as consistency_tables
+    from lidarcore.evaluation.repeatability import tables as repeatability_tables
+    from lidarcore.evaluation.repeatability.statistics import Repeatability
+
+    from .repeatability_table import tables
+
+    if output is not None:
+        consistency_tables.check(output)
+        check_folder(output)
+    extraction = settings_from(settings, set_).extraction
+    study = Repeatability(scans, [name.strip() for name in methods.split(",")] if methods else FITTERS)
+    for scan in islice(open_recording(recording, topic), skip, skip + scans):
+        study.add(compare(scan, extraction, study.methods))
+    summary = study.summary()
+    if not any(found.scatter().is_judged for found in (study.corners, study.walls)):
+        raise EvaluationError(MOVES if study.moved else f"Nothing can be judged. {summary.message}")
+    console = _console()
+    for shown in tables(summary):
+        console.print(shown)
+    for message in dict.fromkeys((summary.message, summary.walls.message)):
+        if message is not None:
+            console.print(message)
+    if output is not None:
+        repeatability_tables.write(summary, output)
+
+
+evaluate.command()(stations)
+evaluate.command()(agreement)
+evaluate.command()(relocation)
+evaluate.command()(walls)
+
+
+def _noise(text: str) -> "SensorNoise":
+    from lidarcore import SensorNoise
+
+    try:
+        sigma_range, sigma_bearing = map(float, text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"--noise {text!r} should be two numbers, m and rad: 0.02,0.0034.") from None
+    return SensorNoise(sigma_range=sigma_range, sigma_bearing=sigma_bearing)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    try:
+        yield
+    except KeyboardInterrupt:
+        typer.echo("Interrupted: nothing was written.", err=True)
+        raise SystemExit(130) from None

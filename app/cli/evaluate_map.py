@@ -1,0 +1,102 @@
+"""The command `lidarcore evaluate map`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+
+if TYPE_CHECKING:
+    from lidarcore.evaluation.maps.study import MapStudy
+
+
+def evaluate_map(
+    recording: RecordingPath,
+    odometry: Annotated[
+        str,
+        typer.Option(
+            help="recorded, poor (3 % scale, 1 % a metre turn bias, noise), none; auto is what the recording allows"
+        ),
+    ] = "auto",
+    seed: Annotated[int, typer.Option(min=0, help="of the poor odometry")] = 0,
+    seeds: Annotated[int, typer.Option(min=1, help="as many runs with poor odometry, from the seed on")] = 1,
+    relations: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="relations between scans verified by hand: t1 t2 dx dy dz r p yaw"),
+    ] = None,
+    own: Annotated[
+        str, typer.Option(metavar="M,RAD", help="standard deviation of the reference poses themselves")
+    ] = "0.02,0.005",
+    topic: Topic = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+) -> None:
+    """How far a map of a recording is from reference poses: relative poses, covariances, loops, time."""
+    from lidarcore import open_recording
+    from lidarcore.evaluation.maps.accuracy import read_relations
+    from lidarcore.evaluation.maps.study import prepared, study
+
+    from .map_run import mapper_settings
+
+    chosen = mapper_settings(settings_from(settings, set_))
+    verified = None if relations is None else read_relations(relations)
+    scans = list(open_recording(recording, topic))
+    sigmas = _sigmas(own)
+    for number in range(seed, seed + seeds):
+        given, reference = prepared(scans, odometry, number)
+        with counting("scans") as count:
+            judged = study(given, reference, chosen, verified, sigmas, count)
+        if seeds > 1:
+            typer.echo(f"seed {number}")
+        for name, value in lines(judged):
+            typer.echo(f"{name:26} {value}")
+
+
+def lines(judged: "MapStudy") -> list[tuple[str, str]]:
+    """The figures, by what they are called."""
+    import numpy as np
+
+    told = [
+        ("scans", f"{judged.scans}, {judged.tracked} of them tracked; {judged.keyframes} keyframes"),
+        (
+            "loops",
+            f"{judged.loops}" if judged.wrong is None else f"{judged.loops}, {judged.wrong} of them wrong",
+        ),
+        ("processor time", f"{judged.seconds:.1f} s; at most {judged.megabytes:.0f} MB"),
+    ]
+    if len(judged.pairs):
+        mean, worst = judged.pairs.mean(axis=0), judged.pairs.max(axis=0)
+        told += [
+            (
+                "relative poses",
+                f"{len(judged.pairs)} pairs: mean {mean[0]:.4f} m, {np.rad2deg(mean[1]):.3f} degrees; "
+                f"largest {worst[0]:.3f} m, {np.rad2deg(worst[1]):.2f} degrees",
+            ),
+        ]
+    if len(judged.normalised):
+        told += [
+            (
+                "normalised error",
+                f"median {np.median(judged.normalised):.2f}; {np.median(judged.allowed):.2f} where the reference is "
+                f"allowed its own error (honest: 2.37)",
+            ),
+        ]
+    if len(judged.relations):
+        mean, worst = judged.relations.mean(axis=0), judged.relations.max(axis=0)
+        told += [
+            (
+                "relations verified by hand",
+                f"{len(judged.relations)}, poses interpolated: mean {mean[0]:.4f} m, {np.rad2deg(mean[1]):.3f} "
+                f"degrees; largest {worst[0]:.3f} m, {np.rad2deg(worst[1]):.2f} degrees",
+            ),
+        ]
+    return told
+
+
+def _sigmas(text: str) -> tuple[float, float]:
+    try:
+        distance, turn = map(float, text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"--own {text!r} should be two numbers, m and rad: 0.02,0.005.") from None
+    return distance, turn

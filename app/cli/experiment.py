@@ -1,0 +1,159 @@
+"""The command `lidarcore experiment`: experiments of papers, run again, and a report of each."""
+
+import os
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import Seed, Topic, Workers, check_folder, end_like_ctrl_c
+from .progress import ForPrograms, counted
+
+if TYPE_CHECKING:
+    from lidarcore import Scan
+    from lidarcore.experiments.claim_rules import Claim
+    from lidarcore.experiments.environments import Design
+
+QUICK_RUNS = 2
+
+experiment = typer.Typer(help="Repeat the experiment of a paper, and write a report.", no_args_is_help=True)
+
+
+@experiment.callback()
+def begin() -> None:
+    """Repeat the experiment of a paper, and write a report."""
+    end_like_ctrl_c()
+
+
+Output = Annotated[
+    Path, typer.Option("-o", "--output", help="FILE.html for the report; replaced if it exists")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="100 scans of each room only, to try it out")]
+Recording = Annotated[
+    Path | None,
+    typer.Option(help="a recording of a sensor at rest, in place of the simulated rooms", exists=True),
+]
+Scans = Annotated[
+    int | None, typer.Option(min=10, help="scans of each room, 2000 if not given; or of the recording, all")
+]
+SigmaRange = Annotated[
+    float | None,
+    typer.Option(help="m, the methods are told; the papers' 0.05 if not given: calibrate a real sensor"),
+]
+SigmaBearing = Annotated[float | None, typer.Option(help="rad, likewise; 0.0035 (0.2°) if not given")]
+
+
+@experiment.command()
+def cwlf(
+    output: Output = Path("cwlf.html"),
+    seed: Seed = 0,
+    scans: Scans = None,
+    recording: Recording = None,
+    topic: Topic = None,
+    sigma_range: SigmaRange = None,
+    sigma_bearing: SigmaBearing = None,
+    quick: Quick = False,
+    workers: Workers = None,
+    for_programs: ForPrograms = False,
+) -> None:
+    """Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time."""
+    check_folder(output)
+    from lidarcore import files
+    from lidarcore.experiments import cwlf as paper
+    from lidarcore.experiments.cwlf_claims import claims
+    from lidarcore.experiments.cwlf_report import html
+    from lidarcore.experiments.environments import Design
+
+    design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
+    _tell_assumption(design, recording)
+    with counted(1 if recording else paper.PARTS, for_programs) as done:
+        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
+    files.write(output, html(result))
+    _tell(output, claims(result))
+
+
+@experiment.command()
+def wctls(
+    output: Output = Path("wctls.html"),
+    seed: Seed = 0,
+    scans: Scans = None,
+    recording: Recording = None,
+    topic: Topic = None,
+    sigma_range: SigmaRange = None,
+    sigma_bearing: SigmaBearing = None,
+    quick: Quick = False,
+    workers: Workers = None,
+    for_programs: ForPrograms = False,
+) -> None:
+    """Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty."""
+    check_folder(output)
+    from lidarcore import files
+    from lidarcore.experiments import wctls as paper
+    from lidarcore.experiments.environments import Design
+    from lidarcore.experiments.wctls_claims import claims
+    from lidarcore.experiments.wctls_report import html
+
+    whole = Design(seed=seed, split_threshold=paper.THRESHOLD)
+    design = _design(whole, scans, sigma_range, sigma_bearing, quick)
+    _tell_assumption(design, recording)
+    with counted(1 if recording else paper.PARTS, for_programs) as done:
+        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
+    files.write(output, html(result))
+    _tell(output, claims(result))
+
+
+@experiment.command("clustering-ekf")
+def clustering_ekf(
+    output: Output = Path("clustering-ekf.html"),
+    seed: Seed = 0,
+    runs: Annotated[
+        int | None, typer.Option(min=1, help="drives along each trajectory; 20 if not given, 2 with --quick")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="one scan a second only, to try it out")] = False,
+    workers: Workers = None,
+    for_programs: ForPrograms = False,
+) -> None:
+    """Four ways to cluster lidar points, with and without a Kalman filter, on three trajectories."""
+    check_folder(output)
+    from lidarcore import files
+    from lidarcore.experiments import clustering_ekf as paper
+    from lidarcore.experiments.clustering_ekf_report import html
+
+    design = paper.Design(seed=seed, runs=runs or (QUICK_RUNS if quick else paper.Design().runs))
+    if quick:
+        design = design.quick()
+    with counted(design.runs * len(paper.TRAJECTORIES), for_programs) as done:
+        result = paper.run(design, workers or os.cpu_count() or 1, done)
+    files.write(output, html(result))
+    typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
+
+
+def _design(
+    design: "Design", scans: int | None, sigma_range: float | None, sigma_bearing: float | None, quick: bool
+) -> "Design":
+    design = design.with_noise(sigma_range, sigma_bearing)
+    if quick:
+        design = design.quick()
+    return design if scans is None else replace(design, scans=scans)
+
+
+def _read(recording: Path | None, topic: str | None, scans: int | None) -> "list[Scan] | None":
+    from lidarcore import open_recording
+
+    return None if recording is None else list(islice(open_recording(recording, topic), scans))
+
+
+def _tell_assumption(design: "Design", recording: Path | None) -> None:
+    if recording is not None and design.assumption:
+        typer.echo(design.assumption)
+
+
+def _tell(output: Path, claims: "list[Claim]") -> None:
+    from lidarcore.reporting import NOT_COMPARABLE
+
+    verdicts = [verdict for *_, verdict in claims]
+    words = {"agree": True, "differ": False, "open": None, NOT_COMPARABLE: NOT_COMPARABLE}
+    told = ", ".join(f"{word} {verdicts.count(verdict)}" for word, verdict in words.items())
+    typer.echo(f"{output}: {len(claims)} claims of the paper: {told}")

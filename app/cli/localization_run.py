@@ -1,0 +1,93 @@
+"""A whole recording's poses, and the map that they make or lie in, into files."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from lidarcore import Array, RecordingError, Scan, extract
+from lidarcore.clusters import cluster
+from lidarcore.files import replacing, write
+from lidarcore.landmarks import FORMATS, read_landmarks, write_landmarks
+from lidarcore.localization import Landmarks, Navigator, TrackingResult, from_stored, to_stored
+from lidarcore.recordings import Recording
+
+from ..pipeline.settings import Settings
+from ..pipeline.tables import csv_text
+
+COLUMNS = (
+    "stamp", "state", "x", "y", "heading", "var_x", "cov_xy", "cov_x_heading", "var_y", "cov_y_heading", "var_heading",
+    "matched", "nis", "dof",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a recording gave: columns of the poses, how many scans, how many of them tracked, and the map."""
+
+    columns: dict[str, list[object]]
+    scans: int
+    tracked: int
+    landmarks: Landmarks
+
+
+def localize(
+    recording: Recording, known: Landmarks | None, settings: Settings, progress: Callable[[int], None]
+) -> Outcome:
+    """Localize in a known map, or build one by SLAM; `progress` is told the number of scans. Raises RecordingError."""
+    mode: Literal["localize", "slam"] = "slam" if known is None else "localize"
+    navigator = Navigator(replace(settings.navigation, mode=mode), known)
+    columns: dict[str, list[object]] = {name: [] for name in COLUMNS}
+    tracked = 0
+    for number, scan in enumerate(recording, 1):
+        found = _step(navigator, scan, settings)
+        for name, value in zip(COLUMNS, _row(found), strict=True):
+            columns[name].append(value)
+        tracked += found.state == "tracking"
+        progress(number)
+    return Outcome(columns, len(columns["stamp"]), tracked, navigator.landmarks)
+
+
+def read_map(path: Path) -> Landmarks:
+    """The landmarks of a file (.json, .csv, .geojson). Raises LandmarkMapError or OSError."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        return from_stored(read_landmarks(file, format_of(path)))
+
+
+def write_map(path: Path, landmarks: Landmarks, method: str) -> None:
+    """The confirmed landmarks; the file appears when complete."""
+    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+        write_landmarks(to_stored(landmarks, method), file, format_of(path))
+
+
+def write_poses(path: Path, outcome: Outcome) -> None:
+    """The poses as CSV; the file appears when complete."""
+    write(path, csv_text(outcome.columns))
+
+
+def format_of(path: Path) -> str:
+    """The format of a map file by its suffix. Raises RecordingError."""
+    name = path.suffix.lower().removeprefix(".")
+    if name not in FORMATS:
+        raise RecordingError(
+            f"{path.name} should end in one of {', '.join('.' + known for known in FORMATS)}."
+        )
+    return name
+
+
+def _step(navigator: Navigator, scan: Scan, settings: Settings) -> TrackingResult:
+    scan = navigator.deskewed(scan)
+    features = extract(scan, settings.extraction)
+    return navigator.step(scan, features, cluster(scan, settings.clusters) if settings.clustered else None)
+
+
+def _row(found: TrackingResult) -> tuple[object, ...]:
+    estimate = found.estimate
+    where = _uncertain(estimate.pose, estimate.covariance)
+    return (found.stamp, found.state, *where, len(found.pairs), found.nis, found.dof)
+
+
+def _uncertain(pose: Array, covariance: Array) -> tuple[float, ...]:
+    return (*pose.tolist(), *covariance[np.triu_indices(3)].tolist())

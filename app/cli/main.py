@@ -1,0 +1,117 @@
+"""The command `lidarcore`. Heavy imports happen inside the commands, so that help is instant."""
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .calibrate import calibrate
+from .devices import devices
+from .emulate import PASS_ON, emulate
+from .evaluate import evaluate
+from .experiment import experiment
+from .localize import localize
+from .map import map_recording
+from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from .record import record
+from .serve import serve
+
+cli = typer.Typer(
+    name="lidarcore",
+    help="2D lidar scans to walls and corners with honest covariances: live in the browser, or into a file.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+@cli.command()
+def process(
+    recording: RecordingPath,
+    output: Annotated[Path, typer.Option("-o", "--output", help="FILE.csv, FILE.parquet or FILE.geojson")],
+    topic: Topic = None,
+    fitter: Annotated[list[str] | None, typer.Option(help="a method; may be repeated to compare")] = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+) -> None:
+    """Write every scan's segments and corners into a file."""
+    from lidarcore import open_recording
+
+    from .process import process as run
+
+    chosen = settings_from(settings, set_)
+    fitters = [chosen.patched({"extraction": {"fitter": name}}).extraction.fitter for name in fitter or []]
+    with counting("scans") as count:
+        counts = run(
+            open_recording(recording, topic),
+            output,
+            chosen.extraction,
+            fitters or [chosen.extraction.fitter],
+            lambda so_far: count(so_far.scans),
+        )
+    typer.echo(f"{output}: {counts.segments} segments and {counts.corners} corners of {counts.scans} scans")
+
+
+@cli.command()
+def info(recording: RecordingPath, topic: Topic = None) -> None:
+    """Say what is in a recording."""
+    from lidarcore import open_recording
+
+    from .info import summarise
+
+    for name, value in summarise(open_recording(recording, topic)):
+        typer.echo(f"{name:20} {value}")
+
+
+cli.command()(serve)
+cli.command()(calibrate)
+cli.command()(devices)
+cli.command()(record)
+cli.command()(localize)
+cli.command("map")(map_recording)
+cli.add_typer(experiment, name="experiment")
+cli.add_typer(evaluate, name="evaluate")
+cli.command(add_help_option=False, context_settings=PASS_ON)(emulate)
+
+
+@cli.command()
+def bench() -> None:
+    """Measure speed and accuracy on this machine."""
+    from ..benchmarks.bench import run
+
+    run()
+
+
+def main() -> None:
+    """Run the command; what the user can mend is one sentence and exit code 2."""
+    try:
+        cli()
+    except Exception as error:
+        message = _message(error)
+        if message is None:
+            raise
+        print(f"lidarcore: {message}", file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+def _message(error: Exception) -> str | None:
+    """The sentence for an error of the user's; None for one of ours."""
+    from pydantic import ValidationError
+
+    from lidarcore import LidarError
+
+    from ..errors import explained
+
+    if isinstance(error, ValidationError):
+        return explained(error)
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}"
+    if isinstance(error, LidarError | OSError | json.JSONDecodeError):
+        return str(error)
+    return None
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,35 @@
+"""The command `lidarcore map`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+
+
+def map_recording(
+    recording: RecordingPath,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="for what the map gives")],
+    topic: Topic = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+) -> None:
+    """A map of where a recording was taken, from whole scans: grid, walls, floor plans, and poses with covariances.
+
+    The folder gets map.pgm and map.yaml (ROS), walls.csv and walls.geojson, plan.svg and plan.dxf, map.png, poses.csv.
+    """
+    from lidarcore import open_recording
+
+    from .map_run import build, write_files
+
+    chosen = settings_from(settings, set_)
+    opened = open_recording(recording, topic)
+    with counting("scans") as count:
+        built = build(opened, chosen, count)
+    walls = write_files(output, built, chosen)
+    typer.echo(
+        f"{output}: {len(built.states)} scans, {built.states.count('tracking')} of them tracked; "
+        f"{len(built.mapper.keyframes.scans)} keyframes, {len(built.mapper.loops)} loops; "
+        f"{len(walls)} walls, {walls.length.sum():.0f} m."
+    )

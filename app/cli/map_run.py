@@ -1,0 +1,59 @@
+"""A whole recording becomes a map: poses with covariances, and files of them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lidarcore.mapping import Mapper, MapperSettings
+from lidarcore.mapping.export import write_map
+from lidarcore.mapping.grid import build_grid
+from lidarcore.mapping.walls import Walls, find_walls
+from lidarcore.recordings import Recording
+
+from ..pipeline.settings import Settings
+from ..pipeline.tables import csv_text
+from .localization_run import COLUMNS
+
+
+@dataclass(frozen=True)
+class Built:
+    """A finished mapper, and "tracking" or "lost" for each scan."""
+
+    mapper: Mapper
+    states: list[str]
+
+
+def mapper_settings(settings: Settings) -> MapperSettings:
+    """The mapper's defaults with the noise of the sensor."""
+    return MapperSettings().with_noise(settings.extraction.noise)
+
+
+def build(recording: Recording, settings: Settings, progress: Callable[[int], None]) -> Built:
+    """Map a recording; `progress` is told the number of scans. Raises RecordingError."""
+    mapper, states = Mapper(mapper_settings(settings)), []
+    for number, scan in enumerate(recording, 1):
+        states.append("tracking" if mapper.step(scan).connected else "lost")
+        progress(number)
+    mapper.finish()
+    return Built(mapper, states)
+
+
+def write_files(folder: Path, built: Built, settings: Settings) -> Walls:
+    """All files of the map, or none; its walls. Raises GridError or MapFileError."""
+    keyframes, poses = built.mapper.keyframes, built.mapper.trajectory()[1]
+    grid = build_grid(keyframes.scans, keyframes.poses)
+    walls = find_walls(
+        keyframes.scans, keyframes.poses, keyframes.covariances, grid, extraction=settings.extraction
+    )
+    write_map(folder, grid, walls, poses, {"poses.csv": poses_csv(built)})
+    return walls
+
+
+def poses_csv(built: Built) -> str:
+    """The poses of all scans, as the finished map has them."""
+    stamps, poses = built.mapper.trajectory()
+    upper = built.mapper.covariances()[:, *np.triu_indices(3)]
+    columns = [stamps.tolist(), built.states, *poses.T.tolist(), *upper.T.tolist()]
+    return csv_text(dict(zip(COLUMNS, columns, strict=False)))

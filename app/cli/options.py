@@ -1,0 +1,112 @@
+"""Options that several commands share, and the settings they make."""
+
+import errno
+import json
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from ..pipeline.settings import Settings
+
+RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
+Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
+Seed = Annotated[int, typer.Option(min=0, help="seed of the random numbers")]
+Workers = Annotated[int | None, typer.Option(min=1, help="processes; one for each core if not given")]
+Set = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="NAME=VALUE", help="a setting, e.g. gap=0.2 or noise.sigma_range=0.01"),
+]
+SettingsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--settings",
+        help="a JSON file of settings, as GET /api/v1/settings gives them, or the name of a kind of sensor, such as "
+        "rplidar_a1_a2, for its noise",
+    ),
+]
+
+
+def end_like_ctrl_c() -> None:
+    """SIGTERM, and SIGHUP unless `nohup` has it ignored, end the command as Ctrl-C does, and what it has started."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)  # Windows has no SIGHUP
+        if number and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
+
+
+def check_folder(file: Path, option: str = "--output") -> None:
+    """Told before minutes of work are lost. Raises FileNotFoundError unless there can be a file of that name."""
+    if file.is_dir() or not file.absolute().parent.is_dir():
+        raise FileNotFoundError(
+            errno.ENOENT, f"is no file in a folder that exists, give one for {option}", str(file)
+        )
+
+
+@contextmanager
+def counting(what: str) -> Iterator[Callable[[int], None]]:
+    """A bar on a terminal that shows how many there have been so far."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (BarColumn(), TextColumn(f"{{task.completed}} {what}"), TimeElapsedColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=None)
+        yield lambda number: bar.update(task, completed=number)
+
+
+def settings_from(file: Path | None, assignments: list[str] | None) -> "Settings":
+    """The defaults, changed by the file or the noise of the sensor named, changed by each NAME=VALUE."""
+    from lidarcore import SENSORS
+
+    from ..pipeline.settings import Settings
+
+    settings = Settings()
+    if str(file) in SENSORS:
+        settings = settings.with_noise(SENSORS[str(file)].noise)
+    elif file is not None:
+        settings = settings.patched(_read_settings(file))
+    for assignment in assignments or []:
+        settings = settings.patched(_patch(assignment))
+    return settings
+
+
+def _read_settings(file: Path) -> dict[str, Any]:
+    from lidarcore import SENSORS, LidarError
+
+    try:
+        settings = json.loads(file.read_text("utf-8"))
+    except FileNotFoundError as error:
+        sensors = ", ".join(SENSORS)
+        raise LidarError(
+            f"There is no file {file}, and no sensor of that name; known are {sensors}."
+        ) from error
+    except ValueError as error:  # not text, or not JSON
+        raise LidarError(f"{file} is no JSON file: {error}.") from error
+    if not isinstance(settings, dict):
+        raise LidarError(f"{file} should hold an object, as GET /api/v1/settings gives it.")
+    return settings
+
+
+def _patch(assignment: str) -> dict[str, Any]:
+    """'gap=0.2' or 'view.theme=light' as a merge patch; names without a section are of the extraction."""
+    from ..pipeline.settings import Settings
+
+    name, equals, text = assignment.partition("=")
+    if not equals:
+        raise typer.BadParameter(f"{assignment!r} should be NAME=VALUE, e.g. gap=0.2.")
+    try:
+        patch = json.loads(text)
+    except json.JSONDecodeError:
+        patch = text
+    path = name.split(".")
+    if path[0] not in Settings.model_fields:
+        path.insert(0, "extraction")
+    for part in reversed(path):
+        patch = {part: patch}
+    return dict(patch)

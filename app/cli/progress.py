@@ -1,0 +1,67 @@
+"""How far a long command is: a bar on the terminal, or lines for the program that has started it."""
+
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from itertools import count
+from typing import Annotated
+
+import typer
+
+from ..jobs.study_process import PROGRESS
+
+ForPrograms = Annotated[
+    bool,
+    typer.Option(
+        "--progress",
+        help=f"for programs: lines '{PROGRESS} DONE TOTAL' on stderr; ends with its standard input",
+    ),
+]
+
+
+@contextmanager
+def progress(total: int, for_programs: bool = False) -> Iterator[Callable[[int], None]]:
+    """Call what it gives with the number of parts that are done."""
+    with _lines(total) if for_programs else _bar(total) as tell:
+        yield tell
+
+
+@contextmanager
+def counted(total: int, for_programs: bool = False) -> Iterator[Callable[[], None]]:
+    """Call what it gives after each of the parts."""
+    with progress(total, for_programs) as tell:
+        numbers = count(1)
+        yield lambda: tell(next(numbers))
+
+
+@contextmanager
+def _lines(total: int) -> Iterator[Callable[[int], None]]:
+    threading.Thread(target=_end_with_input, name="input", daemon=True).start()
+
+    def tell(done: int) -> None:
+        print(PROGRESS, done, total, file=sys.stderr, flush=True)
+
+    tell(0)
+    yield tell
+
+
+def _end_with_input() -> None:
+    """Whoever has started this holds the other end; where it is closed, nobody waits for the result any more."""
+    while os.read(0, 4096):  # not sys.stdin, which cannot be closed while a thread reads it
+        pass
+    os._exit(1)
+
+
+@contextmanager
+def _bar(total: int) -> Iterator[Callable[[int], None]]:
+    """A bar, if there is a terminal."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=total)
+        yield lambda done: bar.update(task, completed=done)

@@ -1,0 +1,58 @@
+"""Repeatability on the terminal."""
+
+from collections.abc import Iterator, Sequence, Sized
+
+from rich.table import Table
+
+from lidarcore.evaluation.intervals import Interval
+from lidarcore.evaluation.repeatability.summary import Box, Method, Summary
+
+from .consistency_table import COLOURS
+
+MICRO = 1e6  # mm² in a m², mrad mm in a rad m
+
+
+def tables(summary: Summary) -> Iterator[Table]:
+    """One of corners, areas in mm², and one of walls, areas of (alpha, r) in mrad mm."""
+    corners = [(method, method.corners) for method in summary.methods]
+    walls = [(method, method.walls) for method in summary.walls.methods]
+    yield _table(f"Corners in the last {summary.scans} scans", "corners", "mm²", corners)
+    yield _table(f"Walls, (alpha, r), in the last {summary.scans} scans", "walls", "mrad mm", walls)
+
+
+def _table(title: str, what: str, unit: str, methods: Sequence[tuple[Method, Sized]]) -> Table:
+    result = Table(
+        title=f"{title}: median one-sigma ellipse of a scan, and the scatter, {unit}", title_justify="left"
+    )
+    for heading in ("fitter", "covariance"):
+        result.add_column(heading, no_wrap=True)
+    for heading in (
+        what, "claimed", "quartiles", "scatter", "claimed / scatter", "in 50 %", "in 95 %", "in 99 %",
+    ):  # fmt: skip
+        result.add_column(heading, justify="right")
+    result.add_column("ellipses are", no_wrap=True)
+    for method, features in methods:
+        for kind, claim in method.claims.items():
+            judged = claim.judgement
+            result.add_row(
+                method.name,
+                kind,
+                str(len(features)),
+                *_box(claim.areas),
+                "" if method.actual_area is None else f"{MICRO * method.actual_area:.2f}",
+                *map(_cell, (judged.area_ratio, judged.coverage_50, judged.coverage_95, judged.coverage_99)),
+                "" if claim.verdict is None else f"[{COLOURS[claim.verdict]}]{claim.verdict}[/]",
+            )
+    return result
+
+
+def _box(box: Box | None) -> tuple[str, str]:
+    if box is None:
+        return "", ""
+    return f"{MICRO * box.median:.2f}", f"{MICRO * box.first_quartile:.2f}–{MICRO * box.third_quartile:.2f}"
+
+
+def _cell(figure: Interval) -> str:
+    if figure.value != figure.value:
+        return ""
+    return f"{figure.value:.2f} ({figure.low:.2f}–{figure.high:.2f})"

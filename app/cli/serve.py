@@ -1,0 +1,93 @@
+"""The command `lidarcore serve`."""
+
+import errno
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Set, SettingsFile, Topic, settings_from
+
+Recording = Annotated[
+    Path | None, typer.Argument(help="play this; if not given, the sensor connected, else an emulated one")
+]
+Host = Annotated[str, typer.Option(help="address to listen on; a token is needed unless it is local")]
+HttpPort = Annotated[int, typer.Option(min=0, max=65535, help="port of the dashboard; 0 takes any free one")]
+SerialPort = Annotated[
+    str | None,
+    typer.Option(
+        help="serial port of the sensor, such as /dev/ttyUSB0; a mere number is taken as --http-port"
+    ),
+]
+Baud = Annotated[int | None, typer.Option(min=1200, help="of the sensor; 256000 if not given")]
+Mode = Annotated[str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers")]
+Rpm = Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")]
+Emulator = Annotated[bool, typer.Option("--emulator", help="an emulated sensor, whatever is connected")]
+Recordings = Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")]
+MapFile = Annotated[
+    str | None,
+    typer.Option(
+        "--map", metavar="URL", help="file of landmark maps; landmarks.db beside the folder of recordings"
+    ),
+]
+MaxUpload = Annotated[int, typer.Option(min=1, help="largest upload, MB")]
+Token = Annotated[
+    str | None, typer.Option(envvar="LIDARCORE_TOKEN", help="token to demand; random if needed")
+]
+AllowHost = Annotated[list[str] | None, typer.Option(help="a further name this server is reached by")]
+OpenBrowser = Annotated[bool, typer.Option("--open-browser", help="open the page")]
+
+
+def serve(
+    recording: Recording = None,
+    topic: Topic = None,
+    host: Host = "127.0.0.1",
+    http_port: HttpPort = 8000,
+    port: SerialPort = None,
+    baud: Baud = None,
+    mode: Mode = None,
+    rpm: Rpm = None,
+    emulator: Emulator = False,
+    recordings: Recordings = Path("recordings"),
+    map: MapFile = None,
+    max_upload: MaxUpload = 1024,
+    token: Token = None,
+    allow_host: AllowHost = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+    open_browser: OpenBrowser = False,
+) -> None:
+    """Serve the dashboard."""
+    from ..web.serving import listen, run, secured
+
+    if port is not None and port.isdecimal():
+        http_port, port = int(port), None
+    if sum(given not in (None, False) for given in (recording, port, emulator)) > 1:
+        raise typer.BadParameter("give one of RECORDING, --port and --emulator.")
+    if recordings.exists() and not recordings.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, "is not a folder: give one for --recordings", str(recordings))
+    with listen(host, http_port) as listening:
+        from ..sources.live import DeviceOptions
+        from ..web.state import ServerOptions
+
+        options = ServerOptions(
+            recordings=recordings,
+            recording=recording,
+            topic=topic,
+            map=map,
+            device=DeviceOptions(port, baud, mode, rpm, emulator),
+            say=lambda sentence: print(sentence, flush=True),
+            settings=settings_from(settings, set_),
+            max_bytes=max_upload << 20,
+            hosts=tuple(allow_host or ()),
+            token=_plain(token),
+        )
+        run(secured(options, host), listening, host, open_browser=open_browser)
+
+
+def _plain(token: str | None) -> str | None:
+    """The token, if it can stand in an address, a header and a cookie as it is; none if it is empty."""
+    if token and not re.fullmatch(r"[A-Za-z0-9._~-]+", token):
+        raise typer.BadParameter("a token has letters, digits and - . _ ~ only.")
+    return token or None

@@ -1,0 +1,83 @@
+"""The command `lidarcore evaluate stations`."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .options import Set, SettingsFile, check_folder, counting, settings_from
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from lidarcore import Scan
+
+WIDTH = 150  # of the tables in a file or a pipe
+
+
+def stations(
+    recordings: Annotated[list[Path], typer.Argument(help="recordings of sensors that stood still")],
+    methods: Annotated[str, typer.Option(metavar="NAME,...", help="fitters to judge")] = "ml,utls",
+    window: Annotated[int, typer.Option(min=10, help="scans that are judged together")] = 100,
+    given: Annotated[
+        bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
+    ] = False,
+    by_station: Annotated[bool, typer.Option("--by-station", help="a table for each station, too")] = False,
+    topic: Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")] = None,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="FILE.json with the figures of every station")
+    ] = None,
+    settings: SettingsFile = None,
+    set_: Set = None,
+) -> None:
+    """Calibrate on the first half of every station where a sensor stood still, and judge the ellipses on the second.
+
+    A recording has several stations if its file says so, or if the sensor was seen to move between them.
+    """
+    from rich.console import Console
+
+    from lidarcore.evaluation.consistency import tables as consistency_tables
+    from lidarcore.evaluation.stations import tables as station_tables
+    from lidarcore.evaluation.stations.study import study
+
+    from .stations_table import limits_table, station_table, table
+
+    if output is not None:
+        consistency_tables.check(output, (".json",))
+        check_folder(output)
+    names = [name.strip() for name in methods.split(",")]
+    extraction = settings_from(settings, set_).extraction
+    with counting("stations") as tell:
+        found = study(
+            named_stations(recordings, topic),
+            names,
+            extraction,
+            window=window,
+            calibrated=not given,
+            tell=tell,
+        )
+    console = Console()
+    if not console.is_terminal:
+        console = Console(width=WIDTH)
+    console.print(table(found))
+    console.print(limits_table(found))
+    if by_station:
+        console.print(station_table(found))
+    for station in found.stations:
+        if station.remark is not None:
+            console.print(f"{station.name}: {station.remark}")
+    if output is not None:
+        station_tables.write(found, output)
+
+
+def named_stations(recordings: list[Path], topic: str | None) -> "Iterator[tuple[str, list[Scan]]]":
+    """Each that is long enough, with a name: that of its file, and a number if there are several."""
+    from lidarcore import open_recording
+    from lidarcore.evaluation.stations.recording import stations as split
+    from lidarcore.evaluation.stations.study import SHORTEST
+
+    for path in recordings:
+        found = [scans for scans in split(open_recording(path, topic)) if len(scans) >= SHORTEST]
+        name = path.name.split(".", 1)[0]
+        for number, scans in enumerate(found, 1):
+            yield (f"{name} {number}" if len(found) > 1 else name), scans

@@ -1,0 +1,49 @@
+"""What can go wrong with what the application keeps; every message says what was found and what to do about it."""
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+from lidarcore import LidarError
+
+
+class NotFoundError(LidarError):
+    """There is nothing of that name."""
+
+
+class ConflictError(LidarError):
+    """It cannot be done now: a name is taken, or something else is under way."""
+
+
+class InvalidNameError(LidarError):
+    """This is no plain file name."""
+
+
+class TooLargeError(LidarError):
+    """More bytes than are allowed."""
+
+
+class StorageError(LidarError):
+    """The disk refused."""
+
+
+class InvalidValues(Protocol):
+    """Pydantic's ValidationError, and what wraps one."""
+
+    def errors(self) -> Sequence[Any]:
+        """Every value that is not valid: `loc` and `msg`."""
+
+
+_PLACES = ("body", "query", "path")  # of a request: what the value is called says enough
+
+
+def invalid_values(error: InvalidValues) -> list[tuple[list[str], str]]:
+    """Every value that is not valid: the names that lead to it, and what is wrong with it."""
+    return [
+        ([str(part) for part in e["loc"] if part not in _PLACES], e["msg"].removeprefix("Value error, "))
+        for e in error.errors()
+    ]
+
+
+def explained(error: InvalidValues) -> str:
+    """All of them in a line, each after its dotted name."""
+    return "; ".join(": ".join(filter(None, (".".join(path), what))) for path, what in invalid_values(error))

@@ -1,0 +1,1 @@
+"""Work beside the frames: recorder, map store, calibration, studies, profiles."""

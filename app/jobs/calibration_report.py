@@ -1,0 +1,206 @@
+"""What a calibration found, with what it means in words: the same for the command, REST and the page."""
+
+import math
+from dataclasses import dataclass
+
+from lidarcore.evaluation.calibration.calibrate import Calibration
+from lidarcore.evaluation.calibration.variances import Bands
+from lidarcore.evaluation.intervals import Interval
+
+DIFFERENT = 0.01  # p-value below which bands are said to differ
+TELLING = 0.05  # m, half-width of the interval of a range bias beyond which it is not told
+
+
+@dataclass(frozen=True, slots=True)
+class BandsReport:
+    """sigma_range (m) in bands between the edges (m, or rad of incidence), and whether data show that it differs."""
+
+    edges: tuple[float, ...]
+    sigmas: tuple[Interval, ...]
+    p_value: float
+    differs: bool
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseFound:
+    """m, rad and 1/m, as the settings have it; None where it cannot be told and what is set should stay.
+
+    Growth and unevenness that are not seen are 0. The systematic part is none of it: from one place it is never seen.
+    """
+
+    sigma_range: float | None
+    sigma_bearing: float | None
+    range_growth: float
+    unevenness: float
+    unevenness_length: float
+    tails: float
+    renewal: float
+    resampling: float
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationReport:
+    """Metres and radians; noise, range_bias and alignment are None where they cannot be told. `remarks` says why."""
+
+    noise: NoiseFound
+    sigma_range: Interval
+    sigma_bearing: Interval
+    range_growth: Interval
+    unevenness: Interval
+    unevenness_length: Interval | None
+    scans_needed: dict[str, int | None]
+    by_range: BandsReport
+    by_incidence: BandsReport
+    outliers: Interval
+    range_bias: Interval | None
+    alignment: Interval | None
+    drift: float
+    walls: int
+    beams: int
+    remarks: tuple[str, ...]
+
+
+def report(found: Calibration) -> CalibrationReport:
+    """All of it."""
+    bias = found.range_bias
+    if bias is not None and bias.half_width > TELLING:
+        bias = None
+    return CalibrationReport(
+        noise=_noise(found),
+        sigma_range=found.sigma_range,
+        sigma_bearing=found.sigma_bearing,
+        range_growth=found.range_growth,
+        unevenness=found.unevenness,
+        unevenness_length=found.unevenness_length,
+        scans_needed=found.scans_needed,
+        by_range=_bands(found.by_range),
+        by_incidence=_bands(found.by_incidence),
+        outliers=found.outliers,
+        range_bias=bias,
+        alignment=found.alignment,
+        drift=found.drift,
+        walls=found.walls,
+        beams=found.beams,
+        remarks=(
+            *_on_sigma("range", found.sigma_range, (1e3, 2, " mm")),
+            *_on_sigma("bearing", found.sigma_bearing, (1e3, 2, " mrad"), (math.degrees(1), 3, "°")),
+            *_on_precision(found),
+            *_on_unevenness(found.unevenness),
+            *_on_bands(found.by_range, "distance", "nearby", "far away"),
+            *_on_bands(found.by_incidence, "incidence", "that beams meet squarely", "that beams graze"),
+            *_on_drift(found.drift, found.sigma_range),
+            _on_bias(bias),
+            _on_alignment(found.alignment),
+        ),
+    )
+
+
+def _noise(found: Calibration) -> NoiseFound:
+    told, noise = found.told, found.noise
+    return NoiseFound(
+        told["sigma_range"],
+        told["sigma_bearing"],
+        noise.range_growth,
+        noise.unevenness,
+        noise.unevenness_length,
+        noise.tails,
+        noise.renewal,
+        noise.resampling,
+    )
+
+
+def _bands(bands: Bands) -> BandsReport:
+    return BandsReport(tuple(bands.edges), tuple(bands.sigmas), bands.p_value, _differs(bands))
+
+
+def _differs(bands: Bands) -> bool:
+    return bands.p_value < DIFFERENT
+
+
+def _on_sigma(name: str, sigma: Interval, *units: tuple[float, int, str]) -> list[str]:
+    """Each of the units with its factor and its digits."""
+    if sigma.low > 0:
+        return []
+    most = " or ".join(f"{_number(sigma.high, factor, digits)}{unit}" for factor, digits, unit in units)
+    return [f"The {name} noise cannot be determined here (at most {most}): keep the current setting."]
+
+
+def _on_precision(found: Calibration) -> list[str]:
+    """Which noise is not known to within 15 % yet, and how many scans that takes."""
+    names = {
+        "sigma_range": "range noise",
+        "sigma_bearing": "bearing noise",
+        "range_growth": "growth with range",
+    }
+    short = {
+        names[name]: needed
+        for name, needed in found.scans_needed.items()
+        if needed is not None and needed > found.scans
+    }
+    if not short:
+        return []
+    parts = ", ".join(f"{needed:,} for the {name}" for name, needed in short.items())
+    return [f"To know each part to within 15 %, take more scans than these {found.scans}: {parts}."]
+
+
+def _on_unevenness(size: Interval) -> list[str]:
+    if size.low > 0:
+        return []
+    return [
+        f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm."
+    ]
+
+
+def _on_bands(bands: Bands, name: str, first: str, last: str) -> list[str]:
+    """Whose ellipses are wrong, where the intervals of the first and the last band say so."""
+    if not _differs(bands):
+        return []
+    low, *_, high = bands.sigmas
+    if high.low > low.high:
+        return [_badly(f"grows with {name}", last)]
+    if high.high < low.low:
+        return [_badly(f"falls with {name}", first)]
+    return [f"Range noise differs with {name}: one number fits badly."]
+
+
+def _badly(how: str, where: str) -> str:
+    return f"Range noise {how}: one number fits badly; ellipses of corners {where} will be too small."
+
+
+def _on_drift(drift: float, sigma_range: Interval) -> list[str]:
+    if drift <= sigma_range.value:
+        return []
+    return [
+        f"A wall drifted by more than the noise, by {_number(drift, 1e3, 1)} mm: was something moving, or the sensor "
+        "still warming up?"
+    ]
+
+
+def _on_bias(bias: Interval | None) -> str:
+    if bias is None:
+        return "The range bias cannot be determined here: it takes more, longer or straighter walls."
+    if bias.contains(0):
+        return f"No range bias is detected: it lies {_between(bias, 1e3, 1)} mm."
+    size, way = _number(abs(bias.value), 1e3, 1), "long" if bias.value > 0 else "short"
+    return (
+        f"Ranges are too {way} by {size} mm ({_between(bias, 1e3, 1)} mm). A profile holds only the noise: "
+        "this bias remains, and walls appear that far off."
+    )
+
+
+def _on_alignment(alignment: Interval | None) -> str:
+    if alignment is None:
+        return "The alignment cannot be determined here: too few walls are parallel or square to each other."
+    value, degrees = _number(alignment.value, math.degrees(1), 2), math.degrees(1)
+    return (
+        f"The walls are turned by {value}° ({_between(alignment, degrees, 2)}°) against the sensor's x axis. If its "
+        "housing stands square to them, this is the offset of its bearings, which shows in no other way."
+    )
+
+
+def _between(figure: Interval, factor: float, digits: int) -> str:
+    return f"between {_number(figure.low, factor, digits)} and {_number(figure.high, factor, digits)}"
+
+
+def _number(value: float, factor: float, digits: int) -> str:
+    return f"{round(factor * value, digits) + 0.0:.{digits}f}".replace("-", "−")  # + 0.0: no −0.0

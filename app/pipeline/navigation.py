@@ -1,0 +1,208 @@
+"""Where the sensor is, from scan to scan: the navigator of the current run, what feeds it and what it leaves behind."""
+
+import threading
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+from numpy.typing import ArrayLike
+
+from lidarcore import Array, Features, Scan
+from lidarcore.clusters import Clusters
+from lidarcore.errors import LandmarkMapError
+from lidarcore.geometry import check_covariance
+from lidarcore.localization import Landmarks, NavigationSettings, Navigator, as_pose
+from lidarcore.mapping import MapPicture, WholeScans
+
+from ..errors import ConflictError
+from ..sources.odometry_feed import OdometryFeed, OdometryStatus
+from ..sources.timed_scan import TimedScan
+from .settings import LiveNavigation, Settings
+from .slam_run import Localization, MapRun, Run
+from .trails import NO_PATHS, Paths, TrackedPose, Trails
+
+NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
+
+
+NOT_MOVED = (
+    "A map of whole scans begins where its first scan was taken: POST /localization/reset begins it anew. "
+    'To place the sensor, set navigation.method to "landmarks".'
+)
+NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."
+
+
+class MapStore(Protocol):
+    """Where maps are kept, each in a session of its own."""
+
+    def begin(self, source: str, *, replay: Hashable) -> MapRun:
+        """An empty map, to be built; in place of the last one with that `replay`, unless it is None."""
+
+    def use(self, session: int | None) -> None:
+        """No map is built any more; that of a session is used, if one is given."""
+
+    def newest(self) -> int | None:
+        """The newest session that has landmarks."""
+
+    def landmarks(self, session: int) -> Landmarks:
+        """The map of a session. Raises UnknownSessionError."""
+
+    def is_built(self, session: int) -> bool:
+        """Whether SLAM built that map, in a frame of its own. Raises UnknownSessionError."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocalizationStatus:
+    """`session` is built or localized in; `map` was chosen to localize in, null for the newest with landmarks."""
+
+    mode: Literal["off", "localize", "slam"]
+    session: int | None
+    map: int | None
+    problem: str | None
+    odometry: OdometryStatus
+
+
+class Navigation:
+    """Feeds the navigator with scans from the worker's thread; the rest may be called from any thread."""
+
+    def __init__(self, store: MapStore) -> None:
+        self.odometry = OdometryFeed()
+        self.problem: str | None = None
+        self._store = store
+        self._map: int | None = None
+        self._run: Run | None = None
+        self._placed: tuple[Array, ArrayLike] | None = None
+        self._lock = threading.RLock()
+
+    @property
+    def session(self) -> int | None:
+        """The session of the map that is built, or localized in."""
+        run = self._run
+        return run.session if run else None
+
+    @property
+    def map(self) -> int | None:
+        """The session chosen to localize in; None for the newest with landmarks."""
+        return self._map
+
+    @property
+    def trajectory(self) -> list[TrackedPose]:
+        """All poses of this run that are kept."""
+        with self._lock:
+            return list(self._run.trails.trajectory) if self._run else []
+
+    @property
+    def paths(self) -> Paths:
+        """Where the sensor has been in this run."""
+        run = self._run
+        return run.paths if run else NO_PATHS
+
+    @property
+    def picture(self) -> MapPicture | None:
+        """Grid and walls, as far as they are known: SLAM from whole scans makes them."""
+        run = self._run
+        return run.picture if run else None
+
+    def choose_map(self, session: int | None) -> None:
+        """Localize in the landmarks of that session. Raises UnknownSessionError."""
+        if session is not None:
+            self._store.landmarks(session)
+        with self._lock:
+            self._map = session
+            if self._run and self._run.known is not None:
+                self._drop_run()
+
+    def reset(self) -> None:
+        """Start over: SLAM with an empty map, localization from nothing."""
+        with self._lock:
+            self._drop_run()
+            self._placed = None
+            self.odometry.clear()
+
+    def close(self) -> None:
+        """End what runs in the background."""
+        with self._lock:
+            if self._run:
+                self._run.close()
+
+    def place(self, pose: ArrayLike, covariance: ArrayLike, wanted: LiveNavigation) -> None:
+        """The sensor is here, says someone: (3,) m, m, rad and (3, 3); between two runs, where the next one begins.
+
+        Raises ConflictError if nothing is localized or the map cannot be moved, LocalizationError if that is no pose
+        or no covariance.
+        """
+        if wanted.mode == "off" or self.problem:
+            raise ConflictError(self.problem or NOT_LOCALIZED)
+        if wanted.mode == "slam" and wanted.method == "scans":
+            raise ConflictError(NOT_MOVED)
+        checked = as_pose(pose, "pose")
+        check_covariance(covariance, "The pose's covariance")
+        with self._lock:
+            if self._run is None:
+                self._placed = checked, covariance
+            else:
+                self._run.navigator.place(checked, covariance)
+
+    def deskewed(self, timed: TimedScan, settings: Settings) -> Scan:
+        """The scan as if the sensor had stood, as far as its motion is known, with the odometry there is."""
+        with self._lock:
+            run = self._of(timed, settings)
+            scan = self._with_odometry(timed.scan)
+            return run.deskewed(timed.position.index, scan) if run else scan
+
+    def step(
+        self, timed: TimedScan, scan: Scan, features: Features, clusters: Clusters | None, method: str
+    ) -> Localization | None:
+        """Go on by a scan that `deskewed` gave; `method` is what found the landmarks in it."""
+        with self._lock:
+            run = self._run
+            return run.step(timed.position.index, scan, features, clusters, method) if run else None
+
+    def _with_odometry(self, scan: Scan) -> Scan:
+        """With what another program says of the moment, unless the source has odometry itself."""
+        if scan.odometry is not None or (pose := self.odometry.at(scan.stamp)) is None:
+            return scan
+        return replace(scan, odometry=pose)
+
+    def _drop_run(self) -> None:
+        if self._run:
+            self._run.end()
+        self._run = None
+
+    def _of(self, timed: TimedScan, settings: Settings) -> Run | None:
+        """The run that this scan belongs to; a new one where the old one does not lead to it."""
+        run, wanted = self._run, settings.navigation
+        if run and run.is_continued_by(timed, wanted):
+            return run
+        self._drop_run()
+        self.problem = None
+        if wanted.mode == "slam" and wanted.method == "scans":
+            self._store.use(None)
+            navigator = WholeScans(settings.extraction)
+            self._run = Run(timed.source, wanted, navigator, None, None, Trails(own_frame=True))
+            self._placed = None
+        elif wanted.mode == "slam":
+            replay = (timed.name, wanted) if timed.position.kind == "recording" else None
+            written = self._store.begin(timed.name, replay=replay)
+            self._run = Run(timed.source, wanted, Navigator(wanted), written, None, Trails(own_frame=True))
+        elif wanted.mode == "localize":
+            self._run = self._localizing(timed, wanted)
+        else:
+            self._store.use(None)
+        if self._run and self._placed:
+            self._run.navigator.place(*self._placed)
+            self._placed = None
+        return self._run
+
+    def _localizing(self, timed: TimedScan, wanted: NavigationSettings) -> Run | None:
+        session = self._map if self._map is not None else self._store.newest()
+        self._store.use(session)
+        try:
+            known = self._store.landmarks(session) if session is not None else ()
+            if session is None or not known:
+                self.problem = NO_MAP
+                return None
+            own_frame = self._store.is_built(session)
+        except LandmarkMapError as error:  # deleted meanwhile, or the file cannot be read
+            self.problem = str(error)
+            return None
+        return Run(timed.source, wanted, Navigator(wanted, known), None, session, Trails(own_frame))

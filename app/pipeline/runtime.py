@@ -1,0 +1,213 @@
+"""From scans to frames: newest scan first, one immutable settings object for each frame."""
+
+import gc
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from lidarcore import SensorNoise, Tracker, compare, localization, warm_up
+from lidarcore.clusters import cluster
+
+from ..errors import NotFoundError
+from ..sources.player import Player
+from ..sources.source import Source
+from ..sources.timed_scan import TimedScan
+from ..threads import FailureLog, join
+from .frame import Frame, Selection
+from .navigation import NOT_LOCALIZED, LocalizationStatus, Navigation
+from .newest import NewestScan
+from .noise_watch import NoiseWatch
+from .sensor_noises import SensorNoises
+from .settings import Settings
+
+logger = logging.getLogger(__name__)
+
+
+DORMANT = (
+    600  # scans, a minute of an S1: how long a corner that is hidden keeps its id while the sensor stands
+)
+END_WITHIN = 5.0  # s that the worker may take for the scan at hand
+
+
+class Runtime:
+    """Owns settings, player, selection and the newest frame. Every method may be called from any thread."""
+
+    def __init__(
+        self,
+        source: Source,
+        settings: Settings,
+        navigation: Navigation,
+        draw: Callable[[Frame], None],
+        noises: SensorNoises,
+    ) -> None:
+        self._noises = noises
+        if settings.extraction.noise != SensorNoise():
+            noises.tell(source, settings.extraction.noise)
+        self.settings = settings.with_noise(noises.of(source))
+        self.navigation = navigation
+        self.selection = Selection()
+        self.frame: Frame | None = None
+        self.ready = False
+        self.frame_listeners: list[Callable[[Frame], None]] = []
+        self.change_listeners: list[Callable[[], None]] = []
+        self._draw = draw
+        self._newest = NewestScan()
+        self.player = Player(source, self._newest.put, lambda: self._newest.idle, self.announce)
+        self._tracker, self._source = Tracker(dormant=DORMANT), 0
+        self._times: deque[float] = deque(maxlen=20)
+        self._sequence = 0
+        self._noise_watch = NoiseWatch()
+        self._processing = FailureLog("scan %s could not be processed")
+        self._lock = threading.Lock()
+        self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
+
+    def start(self) -> None:
+        """Compile the kernels in the background, then play."""
+        self._worker.start()
+
+    def close(self) -> None:
+        self.player.close()
+        self._newest.close()
+        join(self._worker, END_WITHIN)
+        self.navigation.close()
+
+    def set(self, patch: Mapping[str, Any]) -> Settings:
+        """Change settings by a merge patch; the only way there is. Raises pydantic.ValidationError."""
+        with self._lock:
+            before = self.settings.extraction.noise
+            self.settings = self.settings.patched(patch)
+            if self.settings.extraction.noise != before:
+                self._noises.tell(self.player.source, self.settings.extraction.noise)
+        return self._refreshed()
+
+    def select_landmark(self, landmark: int | None) -> None:
+        """Select a landmark of the map by its id, or none."""
+        self.selection = replace(self.selection, landmark=landmark)
+        self._refreshed()
+
+    def select_corner(self, corner: int | None) -> None:
+        """Select a corner of the current frame, or none. Raises NotFoundError."""
+        known = {row.id for row in self.frame.corners} if self.frame else set()
+        if corner is not None and corner not in known:
+            raise NotFoundError(f"There is no corner {corner} in the current frame; it has {sorted(known)}.")
+        self.selection = replace(self.selection, corner=corner)
+        self._refreshed()
+
+    def navigate(self, change: Callable[[Navigation], None]) -> None:
+        """Change something about localization; what it raises goes through, and then nothing has changed."""
+        change(self.navigation)
+        self._refreshed()
+
+    def localization(self) -> LocalizationStatus:
+        """What is localized, and in which map."""
+        return LocalizationStatus(
+            mode=self.settings.navigation.mode,
+            session=self.navigation.session,
+            map=self.navigation.map,
+            problem=self.navigation.problem,
+            odometry=self.navigation.odometry.status(self._why_not_fed()),
+        )
+
+    def _why_not_fed(self) -> str | None:
+        """Why the newest scan takes no odometry from outside, if so."""
+        if self.settings.navigation.mode == "off":
+            return NOT_LOCALIZED
+        if self.frame and self.frame.timed.scan.odometry is not None:
+            return "The source has odometry of its own."
+        return None
+
+    def feed(self, stamp: float, T_odom_sensor: ArrayLike) -> bool:
+        """Odometry from outside; False if too much comes. Raises MotionError if the clock or the pose jumped."""
+        limits = replace(self.settings.navigation.filter, motion="odometry")
+        return self.navigation.odometry.put(stamp, T_odom_sensor, limits)
+
+    def open(self, source: Source, index: int = 0, paused: bool = False) -> None:
+        """Play another source, with the noise of its sensor."""
+        self.selection = Selection()
+        with self._lock:
+            self.settings = self.settings.with_noise(self._noises.of(source))
+        self.player.open(source, index, paused)
+
+    def _refreshed(self) -> Settings:
+        self.player.refresh()
+        self.announce()
+        return self.settings
+
+    def announce(self) -> None:
+        """Tell the listeners that something besides the frame has changed."""
+        for listener in self.change_listeners:
+            listener()
+
+    def _work(self) -> None:
+        try:
+            warm_up()
+            localization.warm_up()
+        except Exception:
+            logger.exception("the kernels could not be compiled ahead; they will be when they are needed")
+        gc.collect()
+        gc.freeze()  # what is here by now stays: searching it again and again delays frames by up to 0.1 s
+        self.ready = True
+        self.player.start()
+        self.announce()
+        while (timed := self._newest.take()) is not None:
+            with self._processing(timed.position):
+                self._publish(self._process(timed))
+            self._newest.done()
+            self.player.wake()
+
+    def _process(self, timed: TimedScan) -> Frame:
+        settings = self.settings
+        if timed.source != self._source:
+            self._source = timed.source
+            self._tracker.forget()
+        scan = self.navigation.deskewed(timed, settings)
+        begin = time.perf_counter()
+        features = compare(scan, settings.extraction, settings.methods)
+        extracted = time.perf_counter()
+        clusters = cluster(scan, settings.clusters) if settings.clustered else None
+        clustered = time.perf_counter()
+        main = next(iter(features.values()))
+        localization = self.navigation.step(timed, scan, main, clusters, settings.landmark_method)
+        located = time.perf_counter()
+        self._sequence += 1
+        return Frame(
+            sequence=self._sequence,
+            timed=timed,
+            scan=scan,
+            settings=settings,
+            features=features,
+            corners=self._tracker.rows(features),
+            selection=self.selection,
+            extract_us=1e6 * (extracted - begin),
+            clusters=clusters,
+            localization=localization,
+            paths=self.navigation.paths,
+            picture=self.navigation.picture,
+            cluster_us=1e6 * (clustered - extracted),
+            locate_us=1e6 * (located - clustered),
+            rate_hz=self._rate(),
+            noise_remark=self._noise_watch.observe(main, timed.source),
+            dropped=self._newest.dropped,
+        )
+
+    def _publish(self, frame: Frame) -> None:
+        begin = time.perf_counter()
+        self._draw(frame)
+        self.frame = frame.drawn(1e6 * (time.perf_counter() - begin))
+        for listener in self.frame_listeners:
+            listener(self.frame)
+
+    def _rate(self) -> float:
+        """Frames per second over the last ones; 0 after a pause."""
+        now = time.monotonic()
+        if self._times and now - self._times[-1] > 2:
+            self._times.clear()
+        self._times.append(now)
+        span = now - self._times[0]
+        return (len(self._times) - 1) / span if span else 0.0

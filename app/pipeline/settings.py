@@ -1,0 +1,168 @@
+"""Everything a user can set: one frozen object, swapped whole, changed only through `Settings.patched`."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import InitErrorDetails
+
+from lidarcore import FITTERS, ExtractionSettings, SensorNoise
+from lidarcore.clusters import ClusterSettings
+from lidarcore.evaluation.repeatability.scatter import LEAST
+from lidarcore.evaluation.repeatability.statistics import WINDOW
+from lidarcore.localization import NavigationSettings
+
+Colour = Literal["plain", "segment", "quality", "range"]
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Layers(_Frozen):
+    """What the scene shows, where a browser does not show it otherwise."""
+
+    points: Annotated[bool, Field(description="measured points")] = True
+    segments: Annotated[bool, Field(description="wall segments")] = True
+    corners: Annotated[bool, Field(description="corners")] = True
+    ellipses: Annotated[bool, Field(description="covariance ellipses of the corners")] = True
+    rejected: Annotated[bool, Field(description="candidates that were rejected")] = False
+    grid: Annotated[bool, Field(description="grid in metres")] = True
+    sensor: Annotated[bool, Field(description="the sensor")] = True
+    gaps: Annotated[bool, Field(description="sectors whose data were lost")] = True
+    clusters: Annotated[bool, Field(description="clusters, each with the ellipse of its members")] = False
+    pose: Annotated[bool, Field(description="the ellipse of the sensor's position")] = True
+    trail: Annotated[bool, Field(description="estimated path of the sensor")] = True
+    dead_reckoned: Annotated[bool, Field(description="its path by odometry alone")] = True
+    truth: Annotated[bool, Field(description="its true path, if known")] = True
+    occupancy: Annotated[
+        bool, Field(description="which parts of the map of whole scans are occupied and free")
+    ] = True
+    walls: Annotated[bool, Field(description="walls of the map of whole scans")] = True
+    landmarks: Annotated[bool, Field(description="landmarks of the map with their ellipses and numbers")] = (
+        True
+    )
+    associations: Annotated[
+        bool, Field(description="lines from observations to the landmarks they match")
+    ] = True
+
+
+class ViewSettings(_Frozen):
+    """How the scene shows it.
+
+    What is compared and what colours the points is the same for all. Layers, the size of ellipses, theme and rotation
+    belong to each browser, which may show them otherwise than they are set here; setting one here sets it for all.
+    """
+
+    compare: Annotated[bool, Field(description="several methods on the same scan at once")] = False
+    methods: Annotated[
+        tuple[str, ...],
+        Field(
+            description="methods shown in compare mode",
+            json_schema_extra={"items": {"type": "string", "enum": list(FITTERS)}, "uniqueItems": True},
+        ),
+    ] = tuple(FITTERS)
+    layers: Layers = Layers()
+    colour: Annotated[Colour, Field(description="what colours the points")] = "plain"
+    ellipse_scale: Annotated[
+        float,
+        Field(ge=1, le=100, allow_inf_nan=False, description="size of the ellipses in sigma"),
+    ] = 10.0
+    theme: Annotated[
+        Literal["dark", "light"],
+        Field(description="colours of the scene, and of a browser that prefers none"),
+    ] = "dark"
+    rotate: Annotated[bool, Field(description="free rotation instead of a map seen from above")] = False
+
+    @field_validator("methods")
+    @classmethod
+    def _known_and_unique(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        for name in names:
+            if name not in FITTERS:
+                raise ValueError(f"unknown fitter {name!r}: choose from {', '.join(FITTERS)}")
+        return tuple(dict.fromkeys(names))
+
+
+class RepeatabilitySettings(_Frozen):
+    """Whether the scatter of the corners is held against what each method claims, while the sensor stands still."""
+
+    running: Annotated[bool, Field(description="whether new scans are compared")] = False
+    window: Annotated[
+        int, Field(ge=LEAST, le=1000, description="how many of the newest scans to compare")
+    ] = WINDOW
+
+
+@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+class LiveNavigation(NavigationSettings):
+    """What a navigator does with each scan, and what SLAM makes its map of."""
+
+    method: Annotated[
+        Literal["scans", "landmarks"],
+        Field(description="what SLAM finds the pose by: whole scans laid on each other, or landmarks"),
+    ] = "scans"
+
+
+class Settings(_Frozen):
+    """All settings: of the extraction, of the clusters, of localization, of the view and of repeatability.
+
+    There is one sensor, so `clusters.noise` always is `extraction.noise`.
+    """
+
+    extraction: ExtractionSettings = ExtractionSettings()
+    clusters: ClusterSettings = ClusterSettings()
+    navigation: LiveNavigation = LiveNavigation()
+    view: ViewSettings = ViewSettings()
+    repeatability: RepeatabilitySettings = RepeatabilitySettings()
+
+    @property
+    def methods(self) -> tuple[str, ...]:
+        """The fitters to run, the main one first."""
+        extra = self.view.methods if self.view.compare else ()
+        return tuple(dict.fromkeys((self.extraction.fitter, *extra)))
+
+    @property
+    def clustered(self) -> bool:
+        """Whether scans are clustered: to be shown, or as landmarks."""
+        wanted = self.navigation
+        located = wanted.mode == "localize" or (wanted.mode == "slam" and wanted.method == "landmarks")
+        return self.view.layers.clusters or (located and wanted.landmarks == "clusters")
+
+    @property
+    def landmark_method(self) -> str:
+        """What finds the landmarks in a scan: the fitter of the walls that meet in corners, or the clustering."""
+        return self.extraction.fitter if self.navigation.landmarks == "corners" else self.clusters.method
+
+    @model_validator(mode="after")
+    def _one_noise(self) -> Self:
+        object.__setattr__(self, "clusters", replace(self.clusters, noise=self.extraction.noise))
+        return self
+
+    def with_noise(self, noise: SensorNoise) -> "Settings":
+        """These settings for a sensor of that noise."""
+        return self.patched({"extraction": {"noise": asdict(noise)}})
+
+    def patched(self, patch: Mapping[str, Any]) -> "Settings":
+        """These settings with a JSON merge patch (RFC 7396) applied; null puts the default back.
+
+        Raises pydantic.ValidationError if a name is unknown or a value is not valid; nothing changes then.
+        """
+        merged = _merge(self.model_dump(), patch, ())
+        return Settings.model_validate_json(json.dumps(merged), strict=True)
+
+
+def _merge(target: Mapping[str, Any], patch: Mapping[str, Any], path: tuple[str, ...]) -> dict[str, Any]:
+    merged = dict(target)
+    for name, value in patch.items():
+        if name not in target:
+            unknown = InitErrorDetails(type="extra_forbidden", loc=(*path, name), input=value)
+            raise ValidationError.from_exception_data("Settings", [unknown])
+        if value is None:
+            del merged[name]
+        elif isinstance(value, Mapping) and isinstance(target[name], Mapping):
+            merged[name] = _merge(target[name], value, (*path, name))
+        else:
+            merged[name] = value
+    return merged

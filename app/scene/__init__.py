@@ -1,0 +1,1 @@
+"""From a frame to the picture that viser shows."""

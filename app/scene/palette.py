@@ -1,0 +1,53 @@
+"""Colours and dashes of the methods, and the colours of what else the scene draws, for a dark and a light page.
+
+Those of the methods are told apart with any colour vision: tests/app/test_palette.py simulates it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .colours import Rgbs, rgb
+
+PALETTE = {
+    "dark": {
+        "points": "#9fb0c8", "rejected": "#ff5c5c", "cluster": "#e58fd0", "trail": "#e8c468", "reckoned": "#8a6fb0",
+        "true": "#4f8fd0", "association": "#c8d2e0", "ambiguous": "#ff9d5c", "free": "#232b36", "occupied": "#8494a8",
+        "wall": "#6fd3e8",
+    },
+    "light": {
+        "points": "#56657a", "rejected": "#c92a2a", "cluster": "#a83a90", "trail": "#a86f00", "reckoned": "#7b4fb0",
+        "true": "#1f6fb8", "association": "#46536a", "ambiguous": "#c45a00", "free": "#e4eaf1", "occupied": "#515d6c",
+        "wall": "#0a7f97",
+    },
+}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class MethodStyle:
+    """How a method is drawn: its colour on each ground, and the dash of its outlines, pixels drawn and left out."""
+
+    dark: str
+    light: str
+    dash: tuple[int, ...] = ()
+
+
+METHOD_STYLES = {
+    "arras_siegwart": MethodStyle("#d69c17", "#dd7800", (1, 3)),
+    "cwlf": MethodStyle("#41f6ff", "#208fe1", (9, 3)),
+    "utls": MethodStyle("#addb99", "#113732", (5, 3)),
+    "wtls": MethodStyle("#b09bac", "#a2567f", (9, 3, 2, 3)),
+    "wctls": MethodStyle("#af98ff", "#3c20b2", (2, 2)),
+    "ml": MethodStyle("#ee4972", "#ae2020"),
+}
+
+
+def method_rgb(name: str, theme: str) -> Rgbs:
+    """A method's colour (3,) in a theme."""
+    style = METHOD_STYLES[name]
+    return np.array(rgb(style.dark if theme == "dark" else style.light), np.uint8)
+
+
+def theme_colour(theme: str, name: str) -> Rgbs:
+    """The colour (3,) of something in a theme."""
+    return np.array(rgb(PALETTE[theme][name]), np.uint8)

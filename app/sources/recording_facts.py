@@ -1,0 +1,69 @@
+"""What a recording holds, found by reading all of it once."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from threading import Lock
+
+from lidarcore import LidarError, RecordingError, TopicError, open_recording
+
+from ..isolation import Isolated
+from .recorded import PERIOD
+
+MOST = 500  # recordings of which the facts are kept
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingFacts:
+    """Format, lidars by their topics where it names them, how many scans, and the s from the first to the last.
+
+    scans and duration are None, and `problem` says why, if that is not known.
+    """
+
+    format: str | None
+    topics: tuple[str, ...]
+    scans: int | None
+    duration: float | None
+    problem: str | None = None
+
+
+@dataclass
+class Facts:
+    """Facts of recordings, each read once while it does not change. For any thread."""
+
+    _known: dict[tuple[Path, int, int], RecordingFacts] = field(default_factory=dict)
+    _lock: Lock = field(default_factory=Lock)
+
+    def of(self, path: Path) -> RecordingFacts:
+        """Read the recording, in a process of its own, unless it is known. One at a time: reading takes a core."""
+        status = path.stat()
+        key = (path, status.st_size, status.st_mtime_ns)
+        with self._lock:
+            if key not in self._known:
+                self._known = dict([*self._known.items(), (key, _read(path))][-MOST:])
+            return self._known[key]
+
+
+def _read(path: Path) -> RecordingFacts:
+    found: list[RecordingFacts] = []
+    try:
+        found.extend(Isolated(path.name, RecordingError, _facts, path))
+    except TopicError as error:
+        return RecordingFacts(None, tuple(error.topics), None, None, "It holds several lidars: choose one.")
+    except LidarError as error:
+        begun = found[-1] if found else RecordingFacts(None, (), None, None)
+        return replace(begun, scans=None, duration=None, problem=str(error))
+    return found[-1]
+
+
+def _facts(path: Path) -> Iterator[RecordingFacts]:
+    """The facts as far as it is read, now and then, and in the end."""
+    recording = open_recording(path)
+    scans, duration, before = 0, 0.0, 0.0
+    for scan in recording:
+        step = scan.stamp - before if scans else 0.0
+        duration += step if step > 0 or not scans else PERIOD
+        scans, before = scans + 1, scan.stamp
+        if scans % 500 == 0:
+            yield RecordingFacts(recording.name, recording.topics, scans, duration)
+    yield RecordingFacts(recording.name, recording.topics, scans, duration)

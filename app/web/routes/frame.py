@@ -1,0 +1,84 @@
+"""The current frame, its segments and its corners."""
+
+from typing import Annotated, Literal
+
+from fastapi import APIRouter, Query, WebSocket
+from starlette.responses import Response
+
+from lidarcore import Features
+
+from ...errors import NotFoundError
+from ...pipeline.frame import Frame
+from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns, csv_text, values
+from ..problems import documented, encode
+from ..schemas import CornerJson, FrameJson, SegmentJson
+from ..serializers import corners_json, frame_text, segments_json
+from .dependencies import CurrentFrame, CurrentHub
+from .examples import CORNER, FRAME, SEGMENT, ok
+
+router = APIRouter(tags=["frame"], responses=documented(404, 422))
+
+Fitter = Annotated[
+    str | None, Query(description="a method of the frame; the main one if not given", examples=["ml"])
+]
+Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with a header")]
+Points = Annotated[bool, Query(description="with the measured points")]
+
+
+@router.get("/frame", response_model=FrameJson, responses=ok(FRAME, "The newest frame"))
+def frame(frame: CurrentFrame, points: Points = False) -> Response:
+    """Everything found in the newest scan, by every method that runs."""
+    return Response(frame_text(frame, points), media_type="application/json")
+
+
+@router.get(
+    "/segments",
+    response_model=list[SegmentJson],
+    responses=ok([SEGMENT], "The segments of the newest scan", csv="id,alpha,r,x_start,y_start,..."),
+)
+def segments(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json") -> Response:
+    """The segments by one method, in the order of the ring. Metres and radians, sensor frame."""
+    found = _features(frame, fitter)
+    if format == "csv":
+        return _csv(list(range(len(found.segments))), SEGMENT_COLUMNS, found)
+    return encode(segments_json(found))
+
+
+@router.get(
+    "/corners",
+    response_model=list[CornerJson],
+    responses=ok([CORNER], "The corners of the newest scan", csv="id,segment_1,segment_2,x,y,..."),
+)
+def corners(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json") -> Response:
+    """The corners that one method found; ids last from frame to frame. Metres and radians, sensor frame."""
+    found, name = _features(frame, fitter), fitter or next(iter(frame.features))
+    rows = sorted((row for row in frame.corners if name in row.index), key=lambda row: row.index[name])
+    if format == "csv":
+        return _csv([row.id for row in rows], CORNER_COLUMNS, found)
+    wanted = {row.id for row in rows}
+    only = [
+        row | {"by_method": {name: row["by_method"][name]}}
+        for row in corners_json(frame)
+        if row["id"] in wanted
+    ]
+    return encode(only)
+
+
+@router.websocket("/stream")
+async def stream(websocket: WebSocket, hub: CurrentHub, points: Points = False) -> None:
+    """Frames and changes of state as they happen, newest first; a slow client gets fewer, never old ones."""
+    await websocket.accept()
+    await hub.serve(websocket, points)
+
+
+def _features(frame: Frame, fitter: str | None) -> Features:
+    if fitter is None:
+        return frame.main
+    if fitter not in frame.features:
+        has = ", ".join(frame.features)
+        raise NotFoundError(f"The frame has no {fitter!r}, only {has}: set it as fitter, or compare with it.")
+    return frame.features[fitter]
+
+
+def _csv(ids: list[int], columns: Columns, features: Features) -> Response:
+    return Response(csv_text({"id": ids, **values(columns, features)}), media_type="text/csv")

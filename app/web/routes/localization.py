@@ -1,0 +1,179 @@
+"""Where the sensor is: pose, trajectory, initial pose, odometry from outside, the map to localize in."""
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from fastapi import APIRouter, Body, Query
+from pydantic import Field, TypeAdapter, WithJsonSchema
+from starlette.responses import Response
+from typing_extensions import TypedDict
+
+from ...errors import NotFoundError
+from ...pipeline.navigation import LocalizationStatus, Navigation
+from ...pipeline.runtime import Runtime
+from ...pipeline.tables import csv_text
+from ...pipeline.trails import TrackedPose
+from ..problems import documented, encode
+from ..schemas import Body as Model
+from ..schemas import Coordinate, Matrix3, Number, OdometryPose, Row3
+from ..serializers import pose_json
+from .dependencies import CurrentRuntime
+from .examples import ok
+
+router = APIRouter(tags=["localization"], responses=documented(422))
+
+SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
+MOST_POSES = 10_000
+
+COVARIANCE = [[0.0004, 0.0, 0.0], [0.0, 0.0004, 0.0], [0.0, 0.0, 0.0001]]
+POSE = {
+    "stamp": 1795255000.1, "mode": "slam", "state": "tracking", "message": None, "x": 1.204, "y": -0.311,
+    "heading": 0.52, "covariance": COVARIANCE, "nis": 21.3, "dof": 24,
+}  # fmt: skip
+ROW = {
+    "stamp": 1795255000.1, "x": 1.204, "y": -0.311, "heading": 0.52,
+    "sigma_x": 0.004, "sigma_y": 0.005, "sigma_heading": 0.002,
+}  # fmt: skip
+FED = {"taken": 1204, "refused": 0, "dropped": 0, "stamp": 1795255000.1, "used": True, "problem": None}
+STATE = {"mode": "slam", "session": 3, "map": None, "problem": None, "odometry": FED}
+ODOMETRY = {"stamp": 1795255000.1, "x": 1.2, "y": -0.3, "heading": 0.5}
+ONE = OdometryPose.model_json_schema()
+ONE_OR_SOME = {"anyOf": [ONE, {"type": "array", "items": ONE}], "examples": [ODOMETRY]}
+
+
+class CurrentPoseJson(TypedDict):
+    """T_world_sensor at `stamp` with its covariance (m², m rad, rad²), and what the filter thinks of itself."""
+
+    stamp: float
+    mode: Literal["localize", "slam"]
+    state: Literal["starting", "tracking", "coasting", "lost"]
+    message: str | None
+    x: float
+    y: float
+    heading: float
+    covariance: Matrix3
+    nis: float
+    dof: int
+
+
+class TrajectoryJson(TypedDict):
+    poses: list[TrackedPose]
+
+
+class InitialPose(Model):
+    """T_world_sensor, with its covariance or the standard deviations of position and heading."""
+
+    x: Coordinate
+    y: Coordinate
+    heading: Annotated[Number, Field(description="rad")]
+    covariance: tuple[Row3, Row3, Row3] | None = Field(None, description="of x, y, heading: m², m rad, rad²")
+    sigma_position: Annotated[Number, Field(gt=0, le=100, description="m")] = SIGMA_POSITION
+    sigma_heading: Annotated[Number, Field(gt=0, le=10, description="rad")] = SIGMA_HEADING
+
+
+class MapChoice(Model):
+    """The session to localize in; null for the newest that has landmarks."""
+
+    session: Annotated[int, Field(strict=True)] | None
+
+
+Since = Annotated[float | None, Query(allow_inf_nan=False, description="only poses after this stamp, s")]
+Limit = Annotated[int, Query(ge=1, le=MOST_POSES, description="at most so many, the newest")]
+Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with a header")]
+
+
+@router.get("/localization", responses=ok(STATE, "What is localized, and in which map"))
+def read(runtime: CurrentRuntime) -> LocalizationStatus:
+    """Whether the pose is estimated, and in which map."""
+    return runtime.localization()
+
+
+@router.post("/localization/reset", responses=ok(STATE, "What is localized now"))
+def reset(runtime: CurrentRuntime) -> LocalizationStatus:
+    """Start over: SLAM with an empty map in a new session, localization from nothing."""
+    runtime.navigate(Navigation.reset)
+    return runtime.localization()
+
+
+@router.put("/localization/map", responses=ok(STATE, "What is localized in") | documented(404))
+def choose_map(
+    runtime: CurrentRuntime, choice: Annotated[MapChoice, Body(examples=[{"session": 3}])]
+) -> LocalizationStatus:
+    """Choose the map to localize in; the mode stays what it is."""
+    runtime.navigate(lambda navigation: navigation.choose_map(choice.session))
+    return runtime.localization()
+
+
+@router.get("/pose", responses=ok(POSE, "The pose after the newest scan") | documented(404))
+def pose(runtime: CurrentRuntime) -> CurrentPoseJson:
+    """Where the sensor is."""
+    localization = runtime.frame.localization if runtime.frame else None
+    if localization is None:
+        raise NotFoundError(f"There is no pose: {_why(runtime)}")
+    found = localization.tracking
+    return {
+        "stamp": found.stamp,
+        "mode": found.mode,
+        "state": found.state,
+        "message": found.message,
+        **pose_json(found.estimate.pose),
+        "covariance": found.estimate.covariance.tolist(),
+        "nis": found.nis,
+        "dof": found.dof,
+    }
+
+
+@router.post("/pose", responses=ok(STATE, "The pose is set") | documented(409))
+def place(
+    runtime: CurrentRuntime,
+    pose: Annotated[InitialPose, Body(examples=[{"x": 1.0, "y": 0.5, "heading": 0.0}])],
+) -> LocalizationStatus:
+    """Tell where the sensor is. 409 if nothing is localized, or the map is made of whole scans."""
+    variances = [pose.sigma_position**2, pose.sigma_position**2, pose.sigma_heading**2]
+    covariance = np.diag(variances) if pose.covariance is None else np.array(pose.covariance)
+    wanted, at = runtime.settings.navigation, (pose.x, pose.y, pose.heading)
+    runtime.navigate(lambda navigation: navigation.place(at, covariance, wanted))
+    return runtime.localization()
+
+
+@router.get(
+    "/trajectory",
+    response_model=TrajectoryJson,
+    responses=ok({"poses": [ROW]}, "The poses of this run, the oldest first", csv=",".join(ROW)),
+)
+def trajectory(
+    runtime: CurrentRuntime, since: Since = None, limit: Limit = 1000, format: Format = "json"
+) -> Response:
+    """Where the sensor has been in this run, as the filter had it at each moment; empty if nothing is localized."""
+    rows = [row for row in runtime.navigation.trajectory if since is None or row.stamp > since][-limit:]
+    if format == "csv":
+        columns = {name: [getattr(row, name) for row in rows] for name in ROW}
+        return Response(csv_text(columns), media_type="text/csv")
+    return encode({"poses": rows})
+
+
+@router.post("/odometry", status_code=204)
+def odometry(
+    runtime: CurrentRuntime,
+    poses: Annotated[Any, WithJsonSchema(ONE_OR_SOME), Body()],
+) -> None:
+    """Feed T_odom_sensor, one pose or some in their order; stamps are Unix seconds, as those of the scans.
+
+    Refused, and left out, if the clock went back or the pose jumped: what came before it in a list is taken.
+    More than a thousand a second are left out. GET /localization tells what became of them.
+    """
+    for pose in _poses(poses):
+        runtime.feed(pose.stamp, (pose.x, pose.y, pose.heading))
+
+
+def _poses(body: Any) -> list[OdometryPose]:
+    """One or some; a union of both would complain about both. Raises pydantic.ValidationError."""
+    if isinstance(body, list):
+        return TypeAdapter(list[OdometryPose]).validate_python(body)
+    return [OdometryPose.model_validate(body)]
+
+
+def _why(runtime: Runtime) -> str:
+    if runtime.settings.navigation.mode == "off":
+        return "nothing is localized; set navigation.mode to slam or localize."
+    return runtime.navigation.problem or "no scan has been processed yet."

@@ -1,0 +1,110 @@
+"""A whole map as a file, out and in."""
+
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal
+from zipfile import ZipFile
+
+import anyio
+from fastapi import APIRouter, Query, Request
+from starlette.background import BackgroundTask
+from starlette.concurrency import run_in_threadpool
+from starlette.responses import FileResponse
+
+from lidarcore.landmarks import Session, export_map, export_picture
+
+from ...jobs.landmark_store import LandmarkStore
+from ..problems import ProblemError, documented
+from .dependencies import CurrentLandmarks, Heavy
+from .examples import LANDMARK, MEDIA_TYPES, SESSION, ok
+from .landmarks import SessionId, chosen_map
+
+MAX_BYTES = 32 << 20  # of a map that is loaded, some 150,000 landmarks
+MOST_PIXELS = 16_000_000  # of a picture: 200 m by 200 m at 5 cm, and 32 MB while it is packed
+PICTURES = ("png", "zip")
+
+router = APIRouter(prefix="/map", tags=["landmarks"], responses=documented(422, 503))
+
+EXAMPLE = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [LANDMARK]}
+CSV = "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind,method,count,first_seen_s,last_seen_s,id\r\n..."
+FILES: dict[str, Any] = {
+    "application/json": {"schema": {"type": "object", "examples": [EXAMPLE]}},
+    "text/csv": {"schema": {"type": "string"}},
+    "application/geo+json": {"schema": {"type": "object"}},
+}
+
+
+@router.get(
+    "",
+    response_class=FileResponse,
+    responses=ok(
+        EXAMPLE, "The map as a file", csv=CSV, geojson={"type": "FeatureCollection"}, png="...", zip="..."
+    )
+    | documented(404),
+)
+async def download(
+    landmarks: CurrentLandmarks,
+    heavy: Heavy,
+    session: SessionId = None,
+    format: Annotated[
+        Literal["json", "csv", "geojson", "png", "zip"],
+        Query(description="zip: map.png and map.yaml as ROS map_server reads them; png: the picture alone"),
+    ] = "json",
+    resolution: Annotated[float, Query(ge=1e-3, le=1e3, description="m a pixel, of a picture")] = 0.05,
+) -> FileResponse:
+    """All landmarks of a session, in metres in its world frame. Made for one request at a time: others wait."""
+    make = partial(_file, landmarks, session, format, resolution)
+    return await anyio.to_thread.run_sync(make, limiter=heavy)
+
+
+@router.post(
+    "",
+    status_code=201,
+    openapi_extra={"requestBody": {"required": True, "content": FILES}},
+    responses=ok(SESSION, "The new session", 201) | documented(413),
+)
+async def upload(
+    request: Request,
+    landmarks: CurrentLandmarks,
+    format: Annotated[Literal["json", "csv", "geojson"], Query(description="of the body")] = "json",
+    name: Annotated[
+        str, Query(min_length=1, max_length=200, description="what the session is said to come from")
+    ] = "a file",
+) -> Session:
+    """Load a map: the body is a file as GET gives it. It becomes a session of its own if all of it makes sense."""
+    if not name.isprintable():
+        raise ProblemError(422, f"name is {name!r}: give printable text.")
+    with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder:
+        path = Path(folder) / f"map.{format}"
+        with path.open("xb") as file:
+            async for chunk in request.stream():
+                if file.tell() + len(chunk) > MAX_BYTES:
+                    raise ProblemError(413, f"The map is larger than {MAX_BYTES} bytes.")
+                file.write(chunk)
+        return await run_in_threadpool(landmarks.load, path, format, name)
+
+
+def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution: float) -> FileResponse:
+    landmark_map = chosen_map(landmarks, session)
+    folder = tempfile.TemporaryDirectory(prefix="lidarcore-map-")
+    try:
+        path = Path(folder.name) / f"map.{format}"
+        if format in PICTURES:
+            export_picture(landmark_map, path.with_suffix(".png"), resolution, MOST_PIXELS)
+        else:
+            export_map(landmark_map, path)
+        if format == "zip":
+            _pack(path)
+    except BaseException:
+        folder.cleanup()
+        raise
+    name, cleanup = f"map-{landmark_map.session}.{format}", BackgroundTask(folder.cleanup)
+    return FileResponse(path, media_type=MEDIA_TYPES[format], filename=name, background=cleanup)
+
+
+def _pack(path: Path) -> None:
+    """Put the picture and what says where it is into one file."""
+    with ZipFile(path, "w") as archive:
+        for part in (path.with_suffix(".png"), path.with_suffix(".yaml")):
+            archive.write(part, part.name)

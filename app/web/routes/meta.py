@@ -1,0 +1,139 @@
+"""Health, version, and what methods there are."""
+
+import platform
+import time
+from importlib import metadata
+
+import psutil
+from fastapi import APIRouter
+from typing_extensions import TypedDict
+
+from lidarcore import FITTERS
+from lidarcore.clusters import CLUSTERERS
+
+from ...scene.palette import METHOD_STYLES
+from .dependencies import CurrentHub, CurrentRuntime
+from .examples import ok
+
+router = APIRouter(tags=["meta"])
+
+_process = psutil.Process()
+
+
+class HealthJson(TypedDict):
+    status: str
+    ready: bool
+    uptime_s: float
+    clients: int
+    memory_bytes: int
+    cpu_s: float
+
+
+class VersionJson(TypedDict):
+    version: str
+    python: str
+    viser: str
+    numba: str
+
+
+class FitterJson(TypedDict):
+    """`colour` is for a dark ground, `colour_light` for a light one; outlines have a `dash`, pixels on and off."""
+
+    name: str
+    title: str
+    reference: str
+    summary: str
+    colour: str
+    colour_light: str
+    dash: tuple[int, ...]
+
+
+class ClustererJson(TypedDict):
+    """`parameters` are those of the settings of clusters that only this method, or few, use."""
+
+    name: str
+    title: str
+    reference: str
+    summary: str
+    parameters: list[str]
+
+
+class MethodsJson(TypedDict):
+    fitters: list[FitterJson]
+    clusterers: list[ClustererJson]
+    covariances: list[str]
+
+
+METHODS: MethodsJson = {
+    "fitters": [
+        {
+            "name": fitter.name,
+            "title": fitter.title,
+            "reference": fitter.reference,
+            "summary": fitter.summary,
+            "colour": METHOD_STYLES[fitter.name].dark,
+            "colour_light": METHOD_STYLES[fitter.name].light,
+            "dash": METHOD_STYLES[fitter.name].dash,
+        }
+        for fitter in FITTERS.values()
+    ],
+    "clusterers": [
+        {
+            "name": clusterer.name,
+            "title": clusterer.title,
+            "reference": clusterer.reference,
+            "summary": clusterer.summary,
+            "parameters": [name for name in clusterer.parameters if name != "noise"],
+        }
+        for clusterer in CLUSTERERS.values()
+    ],
+    "covariances": ["consistent", "published"],
+}
+HEALTH = {
+    "status": "ok",
+    "ready": True,
+    "uptime_s": 86.1,
+    "clients": 2,
+    "memory_bytes": 187000000,
+    "cpu_s": 4.2,
+}
+VERSION = {"version": "0.1.0", "python": "3.11.7", "viser": "1.1.1", "numba": "0.61.0"}
+
+
+@router.get("/health", responses=ok(HEALTH, "The server is running"))
+def health(runtime: CurrentRuntime, hub: CurrentHub) -> HealthJson:
+    """Whether the kernels are compiled, and what the process has used so far."""
+    cpu = _process.cpu_times()
+    return {
+        "status": "ok",
+        "ready": runtime.ready,
+        "uptime_s": time.time() - _process.create_time(),
+        "clients": hub.clients,
+        "memory_bytes": _process.memory_info().rss,
+        "cpu_s": cpu.user + cpu.system,
+    }
+
+
+@router.get("/version", responses=ok(VERSION, "Versions"))
+def version() -> VersionJson:
+    """Versions of this project and of what its results and pictures depend on."""
+    return {
+        "version": version_of("lidarcore"),
+        "python": platform.python_version(),
+        "viser": version_of("viser"),
+        "numba": version_of("numba"),
+    }
+
+
+@router.get("/methods", responses=ok(METHODS, "The methods"))
+def methods() -> MethodsJson:
+    """The line fitters, the clustering methods and the kinds of covariance there are."""
+    return METHODS
+
+
+def version_of(distribution: str) -> str:
+    """The version installed; a checkout that is not installed has none."""
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return "checkout"

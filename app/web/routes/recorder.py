@@ -1,0 +1,66 @@
+"""Recording the sensor that plays."""
+
+from datetime import datetime
+from typing import Annotated
+
+from fastapi import APIRouter, Body
+from pydantic import Field
+
+from ...errors import ConflictError
+from ...jobs.recorder import RecorderStatus
+from ...sources.live import LiveSource
+from ..problems import documented
+from ..schemas import StrictBody
+from .dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime
+from .examples import RECORDER, ok
+
+router = APIRouter(prefix="/recorder", tags=["recorder"])
+
+SUFFIX, RAW_SUFFIX = ".mcap", ".rplidar"
+
+
+class RecordingStart(StrictBody):
+    """What to record."""
+
+    name: str | None = Field(
+        None, description="file name in the recordings folder; date and time if not given"
+    )
+    raw: bool = Field(False, description="also the bytes from the port, in a file of their own")
+
+
+@router.get("", responses=ok(RECORDER, "What is recorded, or was recorded last"))
+def read(recorder: CurrentRecorder) -> RecorderStatus:
+    """What is recorded, or was recorded last."""
+    return recorder.status
+
+
+@router.post("/start", responses=ok(RECORDER, "What is recorded now") | documented(409, 422, 507))
+def start(
+    runtime: CurrentRuntime,
+    library: CurrentLibrary,
+    recorder: CurrentRecorder,
+    start: Annotated[RecordingStart, Body(examples=[{}, {"name": "hall.mcap", "raw": True}])],
+) -> RecorderStatus:
+    """Record the live source from now on into the recordings folder, as MCAP that ROS 2 tools open."""
+    source = runtime.player.source
+    if not source.live:
+        raise ConflictError("A recording plays: only what is live can be recorded.")
+    sensor = source if isinstance(source, LiveSource) else None
+    if start.raw and sensor is None:
+        raise ConflictError("A simulation has no port: there are no bytes to record, leave raw out.")
+    name = start.name or f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
+    path = library.new(name if name.endswith(SUFFIX) else name + SUFFIX)
+    raw = library.new(path.stem + RAW_SUFFIX) if start.raw else None
+    scale = runtime.settings.view.ellipse_scale
+    stream, model = (sensor.stream, sensor.device().name) if sensor else (None, "simulated robot")
+    recorder.start(path, raw=raw, stream=stream, sensor=model, ellipse_scale=scale)
+    runtime.announce()
+    return recorder.status
+
+
+@router.post("/stop", responses=ok(RECORDER, "What was recorded"))
+def stop(runtime: CurrentRuntime, recorder: CurrentRecorder) -> RecorderStatus:
+    """End the recording; without one this does nothing."""
+    status = recorder.stop()
+    runtime.announce()
+    return status

@@ -1,0 +1,47 @@
+"""The selected corner and landmark, shared by all pages."""
+
+from typing import Annotated, Self
+
+from fastapi import APIRouter, Body
+from pydantic import model_validator
+
+from ..problems import documented
+from ..schemas import StrictBody
+from .dependencies import CurrentRuntime
+from .examples import ok
+
+router = APIRouter(prefix="/selection", tags=["selection"])
+
+EXAMPLE = {"corner": 12, "landmark": None}
+
+
+class SelectionBody(StrictBody):
+    """Ids of a corner in the frame and of a landmark of the map, or null; what is left out stays."""
+
+    corner: int | None = None
+    landmark: int | None = None
+
+    @model_validator(mode="after")
+    def _names_something(self) -> Self:
+        if not self.model_fields_set:
+            raise ValueError("give corner, landmark or both")
+        return self
+
+
+@router.get("", responses=ok(EXAMPLE, "What is selected"))
+def read(runtime: CurrentRuntime) -> SelectionBody:
+    """Which corner and which landmark are selected, if any."""
+    return SelectionBody(corner=runtime.selection.corner, landmark=runtime.selection.landmark)
+
+
+@router.put("", responses=ok(EXAMPLE, "What is selected") | documented(404, 422))
+def select(
+    runtime: CurrentRuntime,
+    selection: Annotated[SelectionBody, Body(examples=[{"corner": 12}])],
+) -> SelectionBody:
+    """Select a corner of the current frame or a landmark of the map by its id, or none."""
+    if "corner" in selection.model_fields_set:
+        runtime.select_corner(selection.corner)
+    if "landmark" in selection.model_fields_set:
+        runtime.select_landmark(selection.landmark)
+    return read(runtime)

@@ -1,0 +1,73 @@
+"""The sensors there are, and the faults of the emulated one."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Body
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from lidarcore.rplidar import FoundDevice, find_devices
+
+from ...errors import ConflictError
+from ...sources.live import LiveSource
+from ..problems import documented
+from ..schemas import StrictBody
+from .dependencies import CurrentRuntime
+from .examples import DEVICE_FOUND, ok
+
+router = APIRouter(tags=["sensor"])
+
+
+class FoundDeviceJson(TypedDict):
+    """A serial port, and what is known of what is there."""
+
+    path: str
+    description: str
+    vid_pid: str | None
+    looks_like: bool
+    name: str | None
+    serial: str | None
+    error: str | None
+    in_use: bool
+
+
+class Fault(StrictBody):
+    """What the emulated sensor is to do."""
+
+    command: Annotated[
+        str,
+        Field(
+            max_length=100,
+            pattern=r"^(unplug|replug|(stall|flip|lose|lose-bytes|garbage|health)( [0-9.]+){1,2})$",
+            description="unplug, replug, stall SECONDS, flip SHARE, lose SHARE, lose-bytes SHARE, garbage BYTES or "
+            "health STATUS [CODE]",
+        ),
+    ]
+
+
+@router.get("/devices", responses=ok([DEVICE_FOUND], "The serial ports"))
+def devices() -> list[FoundDeviceJson]:
+    """The serial ports of this machine; those that look like an RPLIDAR are asked, which stops one left turning."""
+    return [_found(device) for device in find_devices()]
+
+
+@router.post("/emulator", status_code=204, responses=documented(409, 422))
+def obey(runtime: CurrentRuntime, fault: Annotated[Fault, Body(examples=[{"command": "lose 0.05"}])]) -> None:
+    """Have the emulated sensor show a fault, to see what becomes of it."""
+    source = runtime.player.source
+    if not isinstance(source, LiveSource) or source.emulator is None:
+        raise ConflictError('No emulator plays: PUT {"kind": "emulator"} to /api/v1/source first.')
+    source.emulator.command(fault.command)
+
+
+def _found(device: FoundDevice) -> FoundDeviceJson:
+    return {
+        "path": device.path,
+        "description": device.description,
+        "vid_pid": device.vid_pid,
+        "looks_like": device.looks_like,
+        "name": device.info.name if device.info else None,
+        "serial": device.info.serial if device.info else None,
+        "error": device.error,
+        "in_use": device.in_use,
+    }

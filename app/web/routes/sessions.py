@@ -1,0 +1,42 @@
+"""Sessions: the runs, and imported files, that have a map of their own."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Path
+from starlette.responses import Response
+from typing_extensions import TypedDict
+
+from lidarcore.landmarks import Session
+
+from ...errors import ConflictError
+from ...jobs.landmark_store import StoreStatus
+from ..problems import documented, encode
+from .dependencies import CurrentLandmarks
+from .examples import SESSION, ok
+
+router = APIRouter(prefix="/sessions", tags=["landmarks"], responses=documented(503))
+
+
+class SessionsJson(TypedDict):
+    store: StoreStatus
+    sessions: list[Session]
+
+
+STORE = {"path": "landmarks.db", "session": 3, "landmarks": 27, "behind_s": 0.0, "error": None}
+EXAMPLE = {"store": STORE, "sessions": [SESSION]}
+
+
+@router.get("", response_model=SessionsJson, responses=ok(EXAMPLE, "All sessions, the oldest first"))
+def read(landmarks: CurrentLandmarks) -> Response:
+    """The maps there are, and how well the running one gets to the disk."""
+    return encode({"store": landmarks.status, "sessions": landmarks.atlas.sessions()})
+
+
+@router.delete("/{id}", status_code=204, responses=documented(404, 409, 422))
+def delete(landmarks: CurrentLandmarks, id: Annotated[int, Path(examples=[3])]) -> None:
+    """Delete a session with its landmarks and their history. 409 for the one that is being written."""
+    if landmarks.writes(id):
+        raise ConflictError(
+            f"Session {id} is being written: reset localization to begin another one, or stop SLAM."
+        )
+    landmarks.atlas.delete(id)

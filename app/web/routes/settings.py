@@ -1,0 +1,40 @@
+"""All settings: read, change, and the schema that controls are made from."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body
+
+from ...pipeline.settings import Settings
+from ..problems import documented
+from .dependencies import CurrentRuntime
+from .examples import SETTINGS_PATCH, ok
+
+router = APIRouter(prefix="/settings", tags=["settings"])
+
+EXAMPLE = Settings().model_dump(mode="json")
+
+
+@router.get("", responses=ok(EXAMPLE, "All settings"))
+def read(runtime: CurrentRuntime) -> Settings:
+    """Every setting with its present value, in sections."""
+    return runtime.settings
+
+
+@router.patch("", responses=ok(EXAMPLE, "All settings as they are now") | documented(422))
+def change(
+    runtime: CurrentRuntime, patch: Annotated[dict[str, Any], Body(examples=[SETTINGS_PATCH])]
+) -> Settings:
+    """Change some settings by a JSON merge patch (RFC 7396); null puts a default back.
+
+    All of it is taken, or nothing. It holds from the next scan on; while paused, the current one is redone.
+
+    Settings are shared by all who use the server, but for layers, ellipse_scale, theme and rotate of `view`: each
+    browser has its own, and takes over what is set here for all.
+    """
+    return runtime.set(patch)
+
+
+@router.get("/schema", responses=ok(Settings.model_json_schema(), "A JSON schema"))
+def schema() -> dict[str, Any]:
+    """What each setting means, its unit, its range and its default, as JSON schema."""
+    return Settings.model_json_schema()

@@ -1,0 +1,220 @@
+"""What plays: a sensor, the emulator or a recording, and the transport controls."""
+
+import json
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Body
+from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
+from typing_extensions import TypedDict
+
+from lidarcore import DeviceError
+from lidarcore.simulation.settings import SimulationSettings
+from lidarcore.simulation.worlds import WORLDS
+
+from ...pipeline.runtime import Runtime
+from ...sources.live import DeviceOptions, LiveSource, Taps
+from ...sources.player import SourceStatus
+from ...sources.recorded import RecordingSource
+from ...sources.simulated import SimulationSource
+from ...sources.source import Source
+from ..problems import documented
+from ..schemas import Body as Model
+from ..schemas import Number, StrictBody
+from .dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime, CurrentTaps
+from .examples import SOURCE, ok
+
+router = APIRouter(prefix="/source", tags=["source"])
+
+Index = Annotated[int, Field(ge=0, le=10**9, description="number of the scan, from 0")]
+Speed = Annotated[Number, Field(le=100, json_schema_extra={"anyOf": [{"const": 0}, {"minimum": 0.1}]})]
+
+
+def _runs(speed: float) -> float:
+    if 0 < speed < 0.1 or speed < 0:
+        raise ValueError(f"{speed:g} is neither 0 nor from 0.1 to 100")
+    return speed
+
+
+Rpm = Annotated[int | None, Field(description="speed of the motor; 600 if not given")]
+Mode = Annotated[str | None, Field(description="scan mode; the one the sensor recommends if not given")]
+
+
+class Device(StrictBody):
+    """A sensor at a port."""
+
+    kind: Literal["device"]
+    port: str | None = Field(
+        None, description="path or name of the port; the only sensor connected if not given"
+    )
+    baud: Annotated[int, Field(ge=1200, le=4_000_000)] | None = Field(None, description="256000 if not given")
+    mode: Mode = None
+    rpm: Rpm = None
+
+
+class Emulator(StrictBody):
+    """An emulated RPLIDAR S1 on a pseudo-terminal, read by the same driver as a real one."""
+
+    kind: Literal["emulator"]
+    mode: Mode = None
+    rpm: Rpm = None
+
+
+_SIMULATION = TypeAdapter(SimulationSettings)
+
+
+def _strictly(settings: object) -> object:
+    """As the JSON that it was: in Python, strict would also refuse what a dictionary says of a record."""
+    return (
+        _SIMULATION.validate_json(json.dumps(settings), strict=True)
+        if isinstance(settings, dict)
+        else settings
+    )
+
+
+class Simulation(Model):
+    """A simulated robot with odometry, whose true pose is known; GET /source/simulation describes its settings."""
+
+    kind: Literal["simulation"]
+    settings: Annotated[SimulationSettings, BeforeValidator(_strictly)] = Field(
+        default_factory=SimulationSettings
+    )
+
+
+class Recording(StrictBody):
+    """A recording of the folder."""
+
+    kind: Literal["recording"]
+    name: str
+    topic: str | None = Field(None, description="needed if the recording has several lidar topics")
+    index: Index = 0
+    paused: bool = False
+
+
+class Transport(StrictBody):
+    """What to change; what is left out stays."""
+
+    state: Literal["playing", "paused"] | None = None
+    index: Index | None = None
+    speed: Annotated[Speed, AfterValidator(_runs)] | None = Field(
+        None, description="times as fast as recorded; 0: as fast as possible"
+    )
+    loop: bool | None = None
+    rpm: int | None = Field(None, description="speed of the sensor's motor")
+
+
+class Step(StrictBody):
+    """How many scans to go on, or back if negative."""
+
+    by: Annotated[int, Field(ge=-600, le=600)] = 1
+
+
+Choice = Annotated[
+    Device | Emulator | Simulation | Recording,
+    Body(
+        discriminator="kind",
+        examples=[
+            {"kind": "device", "port": "/dev/ttyUSB0"},
+            {"kind": "simulation", "settings": {"world": "two rooms"}},
+            {"kind": "emulator"},
+            {"kind": "recording", "name": "demo.bag"},
+        ],
+    ),
+]
+
+
+class WorldJson(TypedDict):
+    name: str
+    title: str
+    paths: list[str]
+
+
+class SimulationJson(TypedDict):
+    """`schema` is a JSON schema of the settings: meaning, unit, range and default of each."""
+
+    worlds: list[WorldJson]
+    schema: dict[str, Any]
+
+
+SIMULATION: SimulationJson = {
+    "worlds": [
+        {"name": name, "title": place.title, "paths": list(place.paths)} for name, place in WORLDS.items()
+    ],
+    "schema": _SIMULATION.json_schema()
+    | {"default": _SIMULATION.dump_python(SimulationSettings(), mode="json")},
+}
+
+
+@router.get("", responses=ok(SOURCE, "What plays, where it is, and how"))
+def read(runtime: CurrentRuntime) -> SourceStatus:
+    """What plays, where it is, and how."""
+    return runtime.player.status()
+
+
+@router.put("", responses=ok(SOURCE, "What plays now") | documented(403, 404, 409, 422, 503, 504))
+def play(
+    runtime: CurrentRuntime,
+    library: CurrentLibrary,
+    recorder: CurrentRecorder,
+    taps: CurrentTaps,
+    choice: Choice,
+) -> SourceStatus:
+    """Play a sensor, the emulator or a recording; a recording of the source before ends. If it fails, that goes on.
+
+    409 with the member `topics` if the recording has several lidar topics and none was chosen.
+    """
+    if isinstance(choice, Recording):
+        source: Source = RecordingSource(library.path(choice.name), choice.topic)
+        index, paused = choice.index, choice.paused
+    elif isinstance(choice, Simulation):
+        source, index, paused = SimulationSource(choice.settings, taps.scan), 0, False
+    else:
+        options = DeviceOptions(**choice.model_dump(exclude={"kind"}), emulated=choice.kind == "emulator")
+        source, index, paused = _live(runtime, options, taps), 0, False
+    recorder.stop()
+    runtime.open(source, index, paused)
+    return runtime.player.status()
+
+
+@router.get("/simulation", responses=ok(SIMULATION, "Worlds, and a JSON schema of the settings"))
+def simulation() -> SimulationJson:
+    """Where a simulated robot can drive, and what can be set about it."""
+    return SIMULATION
+
+
+def _live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> LiveSource:
+    """The sensor; the one that plays has to let go of its port first, and gets it back if that fails."""
+    playing = runtime.player.source
+    holder = (
+        playing
+        if isinstance(playing, LiveSource) and not options.emulated and playing.holds(options.port)
+        else None
+    )
+    if holder:
+        holder.close()
+    try:
+        return LiveSource(options, taps)
+    except DeviceError:
+        if holder:
+            runtime.open(LiveSource(holder.options, taps))
+        raise
+
+
+@router.patch("", responses=ok(SOURCE, "What plays, as it is now") | documented(422))
+def control(
+    runtime: CurrentRuntime,
+    transport: Annotated[
+        Transport, Body(examples=[{"state": "paused", "index": 41}, {"speed": 2.0, "loop": False}])
+    ],
+) -> SourceStatus:
+    """Play, pause, seek, set speed and loop; or how fast the sensor turns."""
+    if transport.rpm is not None:
+        runtime.player.source.set_speed(transport.rpm)
+    runtime.player.control(transport.state, transport.index, transport.speed, transport.loop)
+    return runtime.player.status()
+
+
+@router.post("/step", responses=ok(SOURCE, "What plays, as it is now") | documented(422))
+def step(runtime: CurrentRuntime, step: Annotated[Step, Body(examples=[{"by": -1}])]) -> SourceStatus:
+    """Pause, and go some scans on or back."""
+    runtime.player.step(step.by)
+    return runtime.player.status()

@@ -1,0 +1,234 @@
+"""The building as SLAM from whole scans has it now: walls, and which parts are occupied and free."""
+
+import io
+import math
+import tempfile
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+from zipfile import ZipFile
+
+import anyio
+import numpy as np
+from fastapi import APIRouter, Depends, Query
+from numpy.typing import NDArray
+from PIL import Image
+from starlette.responses import Response
+from typing_extensions import TypedDict
+
+from lidarcore.landmarks import Box, Circle
+from lidarcore.mapping import MapPicture
+from lidarcore.mapping.export import MAP_FILES, walls_csv, walls_geojson, write_map
+from lidarcore.mapping.grid import OccupancyGrid, shades_of
+from lidarcore.mapping.walls import Walls, along, distances, in_box, nearest
+
+from ...errors import NotFoundError
+from ...pipeline.runtime import Runtime
+from ..problems import ProblemError, documented, encode
+from ..schemas import Finite, Matrix, Pair
+from .dependencies import CurrentRuntime, Heavy
+from .examples import MEDIA_TYPES, ok
+from .landmarks import Metres, Region
+
+Mask = NDArray[np.bool_]
+
+router = APIRouter(tags=["localization"], responses=documented(404, 422))
+
+NO_BUILDING = 'There is no map of whole scans: set navigation.mode to slam and navigation.method to "scans".'
+NOT_YET = "The map of whole scans has no {} yet: wait for further scans."
+
+WALL = {
+    "id": 0, "alpha": 0.0021, "r": 3.1007, "covariance": [[1.2e-06, 3.1e-07], [3.1e-07, 8.4e-06]],
+    "start": [3.1049, -1.9012], "end": [3.0965, 1.9866], "length": 3.8878, "length_variance": 2.1e-05,
+    "ended": [True, False], "in_corner": [True, False],
+    "first_seen": 1795255000.1, "last_seen": 1795255031.4, "count": 41,
+}  # fmt: skip
+CSV = "id,alpha_rad,r_m,x1_m,y1_m,x2_m,y2_m,length_m,..."
+
+
+class WallJson(TypedDict):
+    """A surface seen from one side: x cos(alpha) + y sin(alpha) = r, rad and m, in the frame of the map.
+
+    `covariance` is of (alpha, r); `ended` is false at an end beyond which the wall may go on, for nobody looked there;
+    `count` keyframes saw it. The number is that of this moment: a later answer may count otherwise.
+    """
+
+    id: int
+    alpha: float
+    r: float
+    covariance: Matrix
+    start: Pair
+    end: Pair
+    length: float
+    length_variance: float
+    ended: tuple[bool, bool]
+    in_corner: tuple[bool, bool]
+    first_seen: float
+    last_seen: float
+    count: int
+
+
+class WallsJson(TypedDict):
+    walls: list[WallJson]
+
+
+class NearestWallsJson(TypedDict):
+    """`distances` m, of each wall from the point."""
+
+    walls: list[WallJson]
+    distances: list[float]
+
+
+async def _wanted(
+    min_length: Annotated[Finite, Query(ge=0, description="m")] = 0.0,
+    max_length: Annotated[Finite, Query(ge=0, description="m")] = math.inf,
+    direction: Annotated[
+        float | None, Query(ge=-7, le=7, description="rad from the x axis; a wall runs both ways")
+    ] = None,
+    tolerance: Annotated[float, Query(ge=0, le=1.6, description="rad that the direction may be off")] = 0.1,
+) -> Callable[[Walls], Mask]:
+    """Which walls count. Raises ProblemError 422 if the lengths are exchanged."""
+    if min_length > max_length:
+        raise ProblemError(
+            422, f"min_length is {min_length:g} m, above max_length, {max_length:g} m: exchange them."
+        )
+
+    def which(walls: Walls) -> Mask:
+        kept: Mask = (walls.length >= min_length) & (walls.length <= max_length)
+        return kept if direction is None else kept & along(walls, direction, tolerance)
+
+    return which
+
+
+Which = Annotated[Callable[[Walls], Mask], Depends(_wanted)]
+
+
+@router.get(
+    "/walls",
+    response_model=WallsJson,
+    responses=ok({"walls": [WALL]}, "The walls", csv=CSV, geojson={"type": "FeatureCollection"}),
+)
+def walls(
+    runtime: CurrentRuntime,
+    region: Region,
+    which: Which,
+    format: Annotated[
+        Literal["json", "csv", "geojson"], Query(description="m, rad, s in all of them")
+    ] = "json",
+) -> Response:
+    """The walls of the map that SLAM makes of whole scans, all or those asked for. 404 if it makes none.
+
+    A wall is in a box or circle if any part of it is.
+    """
+    found = _walls(runtime)
+    chosen = np.flatnonzero(which(found) & _within(found, region)).tolist()
+    if format == "json":
+        return encode({"walls": _rows(found, chosen)})
+    text = walls_csv(found, chosen) if format == "csv" else walls_geojson(found, chosen)
+    return Response(text, media_type=MEDIA_TYPES[format])
+
+
+@router.get(
+    "/walls/nearest",
+    response_model=NearestWallsJson,
+    responses=ok({"walls": [WALL], "distances": [0.412]}, "The nearest first"),
+)
+def nearest_walls(
+    runtime: CurrentRuntime,
+    which: Which,
+    x: Annotated[Metres, Query(description="m", examples=[1.0])],
+    y: Annotated[Metres, Query(description="m", examples=[0.5])],
+    k: Annotated[int, Query(ge=1, le=10_000, description="how many")] = 1,
+) -> Response:
+    """The k walls nearest to a point, and how far from it they are between their ends. 404 if there is no map."""
+    found = _walls(runtime)
+    wanted, far = which(found), distances(found, (x, y))
+    chosen = [i for i in nearest(found, (x, y), len(found)).tolist() if wanted[i]][:k]
+    return encode({"walls": _rows(found, chosen), "distances": far[chosen].tolist()})
+
+
+@router.get(
+    "/map/grid",
+    response_class=Response,
+    responses={200: {"description": "The map", "content": {"image/png": {}, "application/zip": {}}}},
+)
+async def grid(
+    runtime: CurrentRuntime,
+    heavy: Heavy,
+    format: Annotated[
+        Literal["png", "zip"], Query(description="the grid as a picture, or all files of `lidarcore map`")
+    ] = "png",
+) -> Response:
+    """The map that SLAM makes of whole scans, as a picture of its occupancy grid or as files for other programs.
+
+    png: black occupied, white free, grey unknown, y up. Its headers say where it lies: Grid-Resolution is the side of a
+    pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
+    zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF.
+    404 if SLAM makes no map of whole scans, or has no walls yet.
+    """
+    found = _picture(runtime).grid
+    make = partial(_zip, found, _walls(runtime)) if format == "zip" else partial(_grid_png, found)
+    return await anyio.to_thread.run_sync(make, limiter=heavy)
+
+
+def _zip(grid: OccupancyGrid, walls: Walls) -> Response:
+    file = io.BytesIO()
+    with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder, ZipFile(file, "w") as archive:
+        write_map(folder, grid, walls)
+        for name in MAP_FILES:
+            archive.write(Path(folder) / name, name)
+    return Response(file.getvalue(), media_type=MEDIA_TYPES["zip"])
+
+
+def _grid_png(found: OccupancyGrid) -> Response:
+    file = io.BytesIO()
+    Image.fromarray(shades_of(found)).save(file, "PNG")
+    place = {
+        "Grid-Resolution": f"{found.resolution:g}",
+        "Grid-Origin": ",".join(f"{value:.9g}" for value in found.origin.tolist()),
+    }
+    return Response(file.getvalue(), media_type="image/png", headers=place)
+
+
+def _walls(runtime: Runtime) -> Walls:
+    found = _picture(runtime).walls
+    if found is None:
+        raise NotFoundError(NOT_YET.format("walls"))
+    return found
+
+
+def _within(walls: Walls, region: Box | Circle | None) -> Mask:
+    if region is None:
+        return np.ones(len(walls), bool)
+    if isinstance(region, Circle):
+        return distances(walls, (region.x, region.y)) <= region.radius
+    return in_box(walls, (region.x_min, region.y_min), (region.x_max, region.y_max))
+
+
+def _picture(runtime: Runtime) -> MapPicture:
+    wanted, found = runtime.settings.navigation, runtime.navigation.picture
+    if found is not None:
+        return found
+    makes_one = wanted.mode == "slam" and wanted.method == "scans"
+    raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
+
+
+def _rows(walls: Walls, chosen: list[int]) -> list[WallJson]:
+    columns = {
+        "id": range(len(walls)),
+        "alpha": walls.alpha.tolist(),
+        "r": walls.r.tolist(),
+        "covariance": walls.line_covariance.tolist(),
+        "start": walls.ends[:, 0].tolist(),
+        "end": walls.ends[:, 1].tolist(),
+        "length": walls.length.tolist(),
+        "length_variance": walls.length_variance.tolist(),
+        "ended": walls.ended.tolist(),
+        "in_corner": walls.in_corner.tolist(),
+        "first_seen": walls.first_seen.tolist(),
+        "last_seen": walls.last_seen.tolist(),
+        "count": walls.count.tolist(),
+    }
+    rows = list(zip(*columns.values(), strict=True))
+    return [WallJson(**dict(zip(columns, rows[i], strict=True))) for i in chosen]  # type: ignore[typeddict-item]

@@ -1,0 +1,92 @@
+"""The app: REST, WebSocket, page and scene on one port."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from anyio import CapacityLimiter
+from fastapi import APIRouter, FastAPI
+from fastapi.staticfiles import StaticFiles
+from starlette.responses import FileResponse
+
+from . import problems
+from .description import DESCRIPTION
+from .documentation import Documentation
+from .metrics import metrics_router
+from .routes import (
+    calibration,
+    clusters,
+    frame,
+    landmarks,
+    localization,
+    map,
+    measure,
+    meta,
+    recorder,
+    recordings,
+    repeatability,
+    selection,
+    sensor,
+    sessions,
+    settings,
+    source,
+    studies,
+    walls,
+)
+from .security import Guard
+from .state import ServerOptions, State
+
+API = "/api/v1"
+ROUTES = (
+    frame, clusters, measure, localization, walls, landmarks, map, sessions, repeatability, calibration, studies,
+    settings, source, sensor, recordings, recorder, selection, meta,
+)  # fmt: skip
+PAGES = {"/": "index.html", "/studies": "studies.html", "/guide": "guide.html", "/docs": "docs.html"}
+_APP = Path(__file__).parents[1]
+STATIC = next(
+    folder for folder in (_APP / "static", _APP.parent / "static") if folder.is_dir()
+)  # wheel, source tree
+
+
+def create_app(options: ServerOptions) -> FastAPI:
+    """The whole server as an ASGI app. Raises RecordingError, TopicError or DeviceError if it has nothing to play."""
+    state = State(options)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        app.state.heavy = CapacityLimiter(1)
+        state.open()
+        yield
+        state.close()
+
+    app = FastAPI(
+        title="lidarcore",
+        version=meta.version_of("lidarcore"),
+        description=DESCRIPTION,
+        lifespan=lifespan,
+        docs_url=None,
+        redoc_url=None,
+        responses=problems.documented(422),
+    )
+    app.state.server = state
+    problems.install(app)
+    problems.document(app)
+    api = APIRouter(prefix=API)
+    for module in ROUTES:
+        api.include_router(module.router)
+    app.include_router(api)
+    app.include_router(metrics_router(state.metrics))
+    state.viser.install(app)
+    for path, file in PAGES.items():
+        _add_page(app, path, file)
+    app.mount("/documentation", Documentation(), name="documentation")
+    app.mount("/static", StaticFiles(directory=STATIC), name="static")
+    uploads = (f"{API}/recordings/", f"{API}/map")
+    app.add_middleware(Guard, hosts=options.hosts, token=options.token, uploads=uploads)
+    return app
+
+
+def _add_page(app: FastAPI, path: str, file: str) -> None:
+    @app.get(path, include_in_schema=False)
+    def page() -> FileResponse:
+        return FileResponse(STATIC / file)

@@ -1,0 +1,191 @@
+"""Newest wins: each client of the stream has room for one state and one frame, and never gets an old one."""
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Literal
+
+from pydantic import ValidationError
+from pydantic_core import to_json
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from lidarcore.errors import LocalizationError
+
+from ..errors import explained
+from ..jobs.landmark_store import LandmarkStore
+from ..jobs.map_writer import MapChange
+from ..jobs.recorder import AsyncRecorder
+from ..pipeline.frame import Frame
+from ..pipeline.runtime import Runtime
+from .map_changes import MapChanges
+from .schemas import OdometryPose
+from .serializers import frame_text
+
+TICK = 0.5  # s
+PENALTY = 0.01  # s until the next message is read of a client whose last one was not taken
+
+
+class OdometryMessage(OdometryPose):
+    """What a client may send: a pose, with its type."""
+
+    type: Literal["odometry"]
+
+
+class Mailbox:
+    """What one client has still to be sent."""
+
+    def __init__(self, points: bool) -> None:
+        self._points = points
+        self._news = asyncio.Event()
+        self._state_changed = False
+        self._frame: Frame | None = None
+        self._changes = MapChanges()
+
+    def put_change(self, change: MapChange) -> None:
+        self._changes.add(change)
+        self._news.set()
+
+    def put_state(self) -> None:
+        self._state_changed = True
+        self._news.set()
+
+    def put_frame(self, frame: Frame) -> None:
+        self._frame = frame
+        self._news.set()
+
+    async def take(self, state: Callable[[], str]) -> tuple[list[str], Frame | None]:
+        """Wait for news; the messages to send now, made at this moment, and the frame among them."""
+        await self._news.wait()
+        self._news.clear()
+        changed, self._state_changed = self._state_changed, False
+        frame, self._frame = self._frame, None
+        messages = [state()] if changed else []
+        if self._changes:
+            changes, self._changes = self._changes, MapChanges()
+            messages.append(_message("landmarks", changes.text()))
+        if frame is not None:
+            messages.append(_message("frame", frame_text(frame, self._points)))
+        return messages, frame
+
+
+class Hub:
+    """Hands what the runtime's threads produce to the clients on the event loop."""
+
+    def __init__(
+        self,
+        runtime: Runtime,
+        recorder: AsyncRecorder,
+        landmarks: LandmarkStore,
+        sent: Callable[[Frame], None],
+    ) -> None:
+        """`sent` is told of every frame that was handed to a browser's socket."""
+        self._runtime, self._recorder, self._sent = runtime, recorder, sent
+        self._mailboxes: set[Mailbox] = set()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._session: int | None = None  # that was written to last
+        runtime.frame_listeners.append(lambda frame: self._post(Mailbox.put_frame, frame))
+        landmarks.listeners.append(self._written)
+        runtime.change_listeners.append(lambda: self._post(Mailbox.put_state))
+
+    @property
+    def clients(self) -> int:
+        return len(self._mailboxes)
+
+    def open(self) -> None:
+        """Deliver from now on, on the running event loop."""
+        self._loop = asyncio.get_running_loop()
+        self._ticking = self._loop.create_task(self._tick())
+
+    def close(self) -> None:
+        self._ticking.cancel()
+        self._loop = None
+
+    def state(self) -> str:
+        """Everything but the frames, as a message."""
+        runtime = self._runtime
+        state = {
+            "settings": runtime.settings.model_dump(),
+            "source": runtime.player.status(),
+            "selection": asdict(runtime.selection),
+            "localization": runtime.localization(),
+            "recorder": self._recorder.status,
+            "ready": runtime.ready,
+        }
+        return _message("state", to_json(state).decode())
+
+    async def serve(self, websocket: WebSocket, points: bool) -> None:
+        """Feed one accepted client until it goes."""
+        mailbox = Mailbox(points)
+        mailbox.put_state()
+        if self._runtime.frame is not None:
+            mailbox.put_frame(self._runtime.frame)
+        self._mailboxes.add(mailbox)
+        sender = asyncio.create_task(self._send(websocket, mailbox))
+        receiver = asyncio.create_task(self._receive(websocket))
+        try:
+            await asyncio.wait((sender, receiver), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._mailboxes.discard(mailbox)
+            sender.cancel()
+            receiver.cancel()
+            await asyncio.gather(sender, receiver, return_exceptions=True)
+
+    async def _send(self, websocket: WebSocket, mailbox: Mailbox) -> None:
+        while True:
+            messages, frame = await mailbox.take(self.state)
+            for message in messages:
+                await websocket.send_text(message)
+            if frame is not None:
+                self._sent(frame)
+
+    async def _receive(self, websocket: WebSocket) -> None:
+        """Take odometry; say what is wrong with anything else, and go on until the client goes.
+
+        Who sends nonsense or too much has to wait: the socket fills up, and it is the client who notices.
+        """
+        try:
+            while (message := await websocket.receive())["type"] != "websocket.disconnect":
+                try:
+                    pose = OdometryMessage.model_validate_json(message.get("text") or "")
+                    is_taken = self._runtime.feed(pose.stamp, (pose.x, pose.y, pose.heading))
+                except (ValidationError, LocalizationError) as error:
+                    is_taken = False
+                    why = explained(error) if isinstance(error, ValidationError) else str(error)
+                    await websocket.send_text(_refusal(why))
+                if not is_taken:
+                    await asyncio.sleep(PENALTY)
+        except (WebSocketDisconnect, RuntimeError):
+            return
+
+    async def _tick(self) -> None:
+        """The counters of a live source, and the size of a recording, change all the time."""
+        while True:
+            await asyncio.sleep(TICK)
+            if self._runtime.player.source.live or self._recorder.running:
+                self._deliver(Mailbox.put_state)
+
+    def _written(self, change: MapChange) -> None:
+        """A map is told of first when its first landmark is on the disk: only now it has a session."""
+        if change.session != self._session:
+            self._session = change.session
+            self._post(Mailbox.put_state)
+        self._post(Mailbox.put_change, change)
+
+    def _post(self, put: Callable[..., None], *args: object) -> None:
+        loop = self._loop
+        if loop is not None and not loop.is_closed():
+            loop.call_soon_threadsafe(self._deliver, put, *args)
+
+    def _deliver(self, put: Callable[..., None], *args: object) -> None:
+        for mailbox in self._mailboxes:
+            put(mailbox, *args)
+
+
+def _refusal(detail: str) -> str:
+    problem = {"title": "Message ignored", "detail": detail}
+    return _message("error", to_json(problem).decode())
+
+
+def _message(kind: str, json: str) -> str:
+    """A JSON object with its type as first member; nothing is encoded twice."""
+    return f'{{"type":"{kind}",{json[1:]}'

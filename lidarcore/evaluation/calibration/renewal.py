@@ -1,0 +1,86 @@
+"""What of a wall's unevenness the next scan from the same place does not repeat."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from lidarcore.evaluation.repeatability.wall_tracker import WallTracker, unwrapped
+from lidarcore.extraction import extract
+from lidarcore.features import Features
+from lidarcore.noise import SensorNoise
+from lidarcore.scan import Array, Scan
+from lidarcore.settings import ExtractionSettings
+
+_LEAST = 10  # sightings of a wall
+_HELD = 0.95  # of the scatter of walls, by ellipses of 95 %
+_WINDOW = 100  # scans: what drifts for longer is not noise
+_SETTLING = (
+    10  # scans after a start, of real sensors: walls lie four times as far off as later, and then no more
+)
+
+_CHI2_95 = 5.991464547
+_STEPS = np.linspace(0.0, 1.0, 21)
+
+
+def renewal(scans: list[Scan], noise: SensorNoise) -> float:
+    """The least share (0 to 1) with which 95 % ellipses hold as much of how walls scatter in these scans.
+
+    What beams between others find of the same wall is known (`resampling`). But where walls begin and end changes, and
+    what little moves: that shows in how the lines of walls scatter, and nowhere else.
+    """
+    if noise.unevenness == 0:
+        return 1.0
+    errors, repeated, anew = [], [], []
+    for begin in range(_SETTLING if len(scans) > 4 * _SETTLING else 0, len(scans), _WINDOW):
+        window = scans[begin : begin + _WINDOW]
+        least, most = (_sightings(window, noise, share) for share in (0.0, 1.0))
+        for wall, first in least.items():
+            if len(first) >= _LEAST and len(most[wall]) == len(first):
+                line = first[:, :2]
+                errors.append((line - line.mean(0)) / np.sqrt(1 - 1 / len(line)))
+                repeated.append(first[:, 2:].reshape(-1, 2, 2))
+                anew.append(most[wall][:, 2:].reshape(-1, 2, 2))
+    if not errors:
+        return 1.0
+    e, c0, c1 = np.concatenate(errors), np.concatenate(repeated), np.concatenate(anew)
+    for share in _STEPS.tolist():
+        solved = np.linalg.solve(c0 + share * (c1 - c0), e[..., None])[..., 0]
+        if np.mean((e * solved).sum(1) <= _CHI2_95) >= _HELD:
+            return float(share)
+    return 1.0
+
+
+def resampling(scans: list[Scan]) -> float:
+    """How far beams fall elsewhere from scan to scan: 0 on the same bearings, 1 anywhere between their neighbours.
+
+    Twelve times the mean square of the shift over the spacing, which is 1 for a shift that is anywhere.
+    """
+    squares = [_shifts(before.bearings, after.bearings) ** 2 for before, after in pairwise(scans)]
+    return min(float(12 * np.mean(np.concatenate(squares))), 1.0)
+
+
+def _shifts(before: Array, after: Array) -> Array:
+    """(N,) from each bearing to the nearest one of another scan, over the spacing there; at most a half."""
+    there = np.sort(before % (2 * np.pi))
+    there = np.concatenate([there[-1:] - 2 * np.pi, there, there[:1] + 2 * np.pi])
+    here = after % (2 * np.pi)
+    next_ = np.searchsorted(there, here).clip(1, len(there) - 1)
+    low, high = there[next_ - 1], there[next_]
+    shifts: Array = np.minimum(here - low, high - here) / np.maximum(high - low, 1e-9)
+    return shifts
+
+
+def _sightings(scans: list[Scan], noise: SensorNoise, share: float) -> dict[int, Array]:
+    """By wall (N, 6): alpha rad, r m, and their covariance, if that share is sampled anew."""
+    told = {name: getattr(noise, name) for name in noise.__dataclass_fields__} | {"renewal": share}
+    settings = ExtractionSettings(noise=SensorNoise(**told))
+    tracker, seen = WallTracker(memory=len(scans), follow=0.1), dict[int, list[Array]]()
+    for scan in scans:
+        found: Features = extract(scan, settings)
+        for row in tracker.rows({found.fitter: found}):
+            line = found.lines[row.index[found.fitter]]
+            alpha, r = unwrapped(line.alpha, line.r, row.near)
+            turned = np.array([1.0, 1.0, 1.0, 1.0] if r >= 0 else [1.0, -1.0, -1.0, 1.0])
+            sighting = np.concatenate([[alpha, r], turned * line.covariance_consistent.ravel()])
+            seen.setdefault(row.id, []).append(sighting)
+    return {wall: np.array(rows) for wall, rows in seen.items()}

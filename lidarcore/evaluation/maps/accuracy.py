@@ -1,0 +1,109 @@
+"""How far the poses of a map are from reference poses, and from relations between scans verified by hand."""
+
+import gzip
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.errors import EvaluationError
+from lidarcore.geometry import PoseTrack, compose, relative
+from lidarcore.scan import Scan
+
+NEAR, APART = 3.0, 30  # m, scans: pairs that show whether a place that is seen again is the same one
+_SCALE, _BIAS = 1.03, 0.01  # of a poor robot: ways too long, rad that it turns unnoticed in a metre
+_NOISE = np.array([0.05, 0.02, 0.01, 0.03])  # m/√m ahead and aside, rad/√m, rad/√rad
+
+
+def close_pairs(reference: Array) -> Ints:
+    """Pairs (M, 2) i < j of poses (N, 3) less than 3 m from each other and more than 30 scans apart."""
+    pairs = cKDTree(reference[:, :2]).query_pairs(NEAR, output_type="ndarray").astype(np.int64)
+    pairs = np.sort(pairs, axis=1)
+    apart: Ints = pairs[pairs[:, 1] - pairs[:, 0] > APART]
+    return apart
+
+
+def relative_errors(poses: Array, reference: Array, pairs: Ints) -> Array:
+    """Errors (M, 3) m, m, rad of the relative poses T_i_j of pairs (M, 2), seen from where j truly is."""
+    i, j = pairs.T
+    return relative(relative(reference[i], reference[j]), relative(poses[i], poses[j]))
+
+
+def reference_poses(scans: list[Scan]) -> tuple[Array, bool]:
+    """Poses (N, 3) to compare with, and whether they stand where the log has its odometry.
+
+    What a log or simulator gives as truth, else the poses in the log, which are then taken to be corrected ones.
+    Raises EvaluationError if there are neither.
+    """
+    for name in ("truth", "odometry"):
+        poses = [getattr(scan, name) for scan in scans]
+        if all(pose is not None and np.isfinite(pose).all() for pose in poses):
+            return np.array(poses), name == "odometry"
+    raise EvaluationError("The recording has no reference poses: there is nothing to compare the map with.")
+
+
+def with_poor_odometry(scans: list[Scan], reference: Array, seed: int) -> list[Scan]:
+    """The scans with the odometry of a poor robot: 3 % scale, 1 % a metre turn bias, noise."""
+    rng, driven, poor = np.random.default_rng(seed), reference[0], []
+    for k, scan in enumerate(scans):
+        if k:
+            step = relative(reference[k - 1], reference[k])
+            way = float(np.hypot(*step[:2]))
+            ahead, aside, per_metre, per_radian = _NOISE * rng.normal(size=4)
+            noise = [
+                ahead * np.sqrt(way),
+                aside * np.sqrt(way),
+                per_metre * np.sqrt(way) + per_radian * np.sqrt(abs(step[2])),
+            ]
+            driven = compose(driven, step * [_SCALE, _SCALE, 1] + [0, 0, _BIAS * way] + np.array(noise))
+        poor.append(replace(scan, odometry=driven))
+    return poor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Relations:
+    """Relative poses T_1_2 (M, 3) between stamps (M, 2) s, verified by hand."""
+
+    stamps: Array
+    poses: Array
+
+
+def read_relations(path: Path) -> Relations:
+    """Read a file with rows t1 t2 dx dy dz roll pitch yaw, as the benchmark of Kümmerle et al. 2009 gives them.
+
+    Raises EvaluationError if it is none, OSError if it cannot be read.
+    """
+    opened = gzip.open if path.suffix == ".gz" else open
+    try:
+        with opened(path, "rt") as file:
+            table = np.loadtxt(file, ndmin=2)
+    except ValueError as error:
+        raise EvaluationError(f"{path.name} is no file of relations: {error}.") from error
+    if table.shape[1] != 8 or not np.isfinite(table).all():
+        raise EvaluationError(
+            f"{path.name} should have eight numbers in a row: t1 t2 dx dy dz roll pitch yaw."
+        )
+    return Relations(table[:, :2], table[:, [2, 3, 7]])
+
+
+def relation_errors(relations: Relations, stamps: Array, poses: Array, gap: float = 1.0) -> Array:
+    """Errors (M, 2) m and rad of the relations whose stamps lie between poses (N, 3) less than `gap` s apart."""
+    track, errors = PoseTrack(stamps, poses), []
+    sorted_stamps = np.sort(stamps)
+    for (first, second), known_to_be in zip(relations.stamps, relations.poses, strict=True):
+        a, b = (track.at(t) if _covered(sorted_stamps, t, gap) else None for t in (first, second))
+        if a is not None and b is not None:
+            off = relative(known_to_be, relative(a, b))
+            errors.append([np.hypot(off[0], off[1]), abs(off[2])])
+    return np.array(errors).reshape(-1, 2)
+
+
+def _covered(stamps: Array, t: float, gap: float) -> bool:
+    """True if t is a stamp (a file may round it to microseconds), or between two less than `gap` apart."""
+    k = int(np.searchsorted(stamps, t))
+    near = stamps[max(k - 1, 0) : k + 1]
+    if len(near) and np.abs(near - t).min() < 1e-5:
+        return True
+    return len(near) == 2 and float(np.ptp(near)) < gap

@@ -1,0 +1,133 @@
+"""A recording with reference poses is mapped, and the map is judged by them."""
+
+import resource
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.errors import EvaluationError
+from lidarcore.evaluation.maps.accuracy import (
+    Relations,
+    close_pairs,
+    reference_poses,
+    relation_errors,
+    relative_errors,
+    with_poor_odometry,
+)
+from lidarcore.geometry import pose_difference, relative, relative_jacobians, squared_mahalanobis
+from lidarcore.mapping import Mapper, MapperSettings
+from lidarcore.scan import Scan
+
+ODOMETRY = ("auto", "recorded", "poor", "none")
+_WRONG, _WRONG_TURN = 0.5, 0.2  # m and rad by which a loop that was believed is wrong
+_SAMPLE = 500  # pairs of keyframes whose joint covariance is computed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapStudy:
+    """What a map is worth.
+
+    scans, tracked, keyframes, loops, wrong  counts; wrong is of loops that were believed, None without a reference
+    seconds, megabytes                       of processor time, and the process's largest memory
+    pairs       (M,) m and rad errors (M, 2) of relative poses, within 3 m and more than 30 scans apart
+    normalised  (S,) squared errors of pairs of keyframes in units of their claimed covariance, 3 dof
+    allowed     (S,) the same, the reference being allowed its own error
+    relations   (R, 2) m and rad errors of relations verified by hand
+    """
+
+    scans: int
+    tracked: int
+    keyframes: int
+    loops: int
+    wrong: int | None
+    seconds: float
+    megabytes: float
+    pairs: Array
+    normalised: Array
+    allowed: Array
+    relations: Array
+
+
+def prepared(scans: list[Scan], odometry: str, seed: int) -> tuple[list[Scan], Array | None]:
+    """Scans by their stamps with the odometry asked for, and reference poses (N, 3) if there are any.
+
+    recorded takes the log's own, poor makes that of a poor robot from the reference, none leaves it out; auto is
+    recorded where the log has a reference besides, else poor.
+    Raises EvaluationError if the log's odometry is all the reference there is.
+    """
+    if odometry not in ODOMETRY:
+        raise EvaluationError(f"There is no odometry {odometry!r}: choose one of {', '.join(ODOMETRY)}.")
+    order = np.argsort([scan.stamp for scan in scans], kind="stable")
+    scans = [scans[k] for k in order]
+    try:
+        reference, stands_in = reference_poses(scans)
+    except EvaluationError:
+        if odometry == "poor":
+            raise
+        return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), None
+    if odometry == "recorded" and stands_in:
+        raise EvaluationError(
+            "The log's odometry is all the reference there is: choose poor odometry, or none."
+        )
+    if odometry == "poor" or (odometry == "auto" and stands_in):
+        return with_poor_odometry(scans, reference, seed), reference
+    return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), reference
+
+
+def study(
+    scans: list[Scan],
+    reference: Array | None,
+    settings: MapperSettings,
+    relations: Relations | None = None,
+    own: tuple[float, float] = (0.02, 0.005),
+    progress: Callable[[int], None] = lambda number: None,
+) -> MapStudy:
+    """Map the scans and judge the map. own is the standard deviation of the reference's poses themselves, m and rad."""
+    began, mapper, tracked = time.process_time(), Mapper(settings), 0
+    for number, scan in enumerate(scans, 1):
+        tracked += mapper.step(scan).connected
+        progress(number)
+    mapper.finish()
+    seconds = time.process_time() - began
+    megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    stamps, poses = mapper.trajectory()
+    numbers = mapper.keyframes.numbers
+    pairs, normalised, allowed, wrong = np.empty((0, 2)), np.empty(0), np.empty(0), None
+    if reference is not None:
+        pairs = _lengths(relative_errors(poses, reference, close_pairs(reference)))
+        normalised, allowed = _normalised(mapper, reference[numbers], own)
+        wrong = _wrong(mapper, reference[numbers])
+    found = np.empty((0, 2)) if relations is None else relation_errors(relations, stamps, poses)
+    return MapStudy(
+        len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, megabytes,
+        pairs, normalised, allowed, found,
+    )  # fmt: skip
+
+
+def _lengths(errors: Array) -> Array:
+    return np.stack([np.hypot(errors[:, 0], errors[:, 1]), np.abs(errors[:, 2])], -1)
+
+
+def _normalised(mapper: Mapper, reference: Array, own: tuple[float, float]) -> tuple[Array, Array]:
+    pairs: Ints = close_pairs(reference)
+    pairs = np.random.default_rng(0).permutation(pairs)[:_SAMPLE]
+    theirs = np.diag([own[0], own[0], own[1]]) ** 2
+    rows = []
+    for i, j in pairs:
+        found = mapper.relative(i, j)
+        off = pose_difference(found.pose, relative(reference[i], reference[j]))
+        A, B = relative_jacobians(reference[i], reference[j])
+        both = found.covariance + A @ theirs @ A.T + B @ theirs @ B.T
+        rows.append([squared_mahalanobis(off, found.covariance), squared_mahalanobis(off, both)])
+    table = np.array(rows, np.float64).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
+
+
+def _wrong(mapper: Mapper, reference: Array) -> int:
+    ends = np.array([(loop.i, loop.j) for loop in mapper.loops], np.int64).reshape(-1, 2)
+    said = np.array([loop.pose for loop in mapper.loops]).reshape(-1, 3)
+    off = pose_difference(said, relative(reference[ends[:, 0]], reference[ends[:, 1]]))
+    return int(((np.hypot(off[:, 0], off[:, 1]) > _WRONG) | (np.abs(off[:, 2]) > _WRONG_TURN)).sum())

@@ -1,0 +1,168 @@
+"""Repeatability: a sensor that stands still sees the same corners and walls again; does each method know how well?
+
+[WCTLS, Fig. 4] compares ellipse areas over 100 scans; here the ellipses are held against the scatter, too. What is the
+same in every scan, such as a bias or most of a wall's unevenness, cannot be seen this way.
+"""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.errors import EvaluationError
+from lidarcore.evaluation.repeatability.scatter import LEAST, SIGHTING, Observations
+from lidarcore.evaluation.repeatability.sighted import Row, Sighted
+from lidarcore.evaluation.repeatability.standstill import moves
+from lidarcore.evaluation.repeatability.summary import CornerMethod, Summary, WallMethod, WallSummary
+from lidarcore.evaluation.repeatability.wall_tracker import WallRow, WallTracker, unwrapped
+from lidarcore.features import Features
+from lidarcore.lines import FITTERS
+from lidarcore.tracking import Tracker
+
+WINDOW = 100
+_FOLLOW = 0.1  # of the way to a new sighting that the known place of a feature goes
+
+
+class Repeatability:
+    """The last `window` scans of a sensor that stands still, by several methods; it begins anew when the sensor moves.
+
+    standing    it is known to stand still: nothing that changes makes the window begin anew
+    Raises EvaluationError for a window too small to judge a feature in, or a method that does not exist.
+    """
+
+    def __init__(
+        self, window: int = WINDOW, methods: Iterable[str] = tuple(FITTERS), *, standing: bool = False
+    ) -> None:
+        self.window, self.methods = window, tuple(dict.fromkeys(methods))
+        self._standing = standing
+        if window < LEAST:
+            raise EvaluationError(f"A window of {window} scans is too short: give at least {LEAST}.")
+        if unknown := [name for name in self.methods if name not in FITTERS]:
+            raise EvaluationError(f"Unknown methods {unknown}: choose from {', '.join(FITTERS)}.")
+        if not self.methods:
+            raise EvaluationError(f"No method is given: choose from {', '.join(FITTERS)}.")
+        self.corners, self.walls = (Sighted(window, self.methods, noun) for noun in ("corner", "wall"))
+        self._corner_tracker = Tracker(memory=window, follow=_FOLLOW)
+        self._wall_tracker = WallTracker(memory=window, follow=_FOLLOW)
+        self._moved = False
+
+    def __len__(self) -> int:
+        """Scans in the window."""
+        return len(self.corners)
+
+    def clear(self) -> None:
+        """Forget every scan: the sensor was moved, or something was set differently. Ids are never used again."""
+        self.corners.clear()
+        self.walls.clear()
+        self._corner_tracker.forget()
+        self._wall_tracker.forget()
+        self._moved = False
+
+    def add(self, features: Mapping[str, Features]) -> None:
+        """One more scan, as `compare(scan, settings, methods)` gives it.
+
+        Raises EvaluationError if a method is missing in it.
+        """
+        if missing := [name for name in self.methods if name not in features]:
+            raise EvaluationError(
+                f"The features are without {', '.join(missing)}: compare() with every method."
+            )
+        features = {name: features[name] for name in self.methods}
+        corners: list[Row] = [(row.id, row.index) for row in self._corner_tracker.rows(features)]
+        self.corners.add(corners, {name: _corners_seen(found) for name, found in features.items()})
+        walls = self._wall_tracker.rows(features)
+        seen = {name: _walls_seen(found, name, walls) for name, found in features.items()}
+        self.walls.add([(row.id, row.index) for row in walls], seen)
+        if not self._standing:
+            self._watch()
+
+    def _watch(self) -> None:
+        """Begin anew if corners or walls say that the sensor moved."""
+        corners, walls, newest = self.corners.sightings(), self.walls.sightings(), len(self) - 1
+        if moves(corners, _first(corners), newest) or moves(walls, _feet(_first(walls)), newest):
+            self.clear()
+            self._moved = True
+        elif len(self) == self.window:
+            self._moved = False
+
+    @property
+    def moved(self) -> bool:
+        """Whether the sensor moved and the window, which then began anew, is not full again."""
+        return self._moved
+
+    def summary(self) -> Summary:
+        """What the window says now."""
+        corners, walls = self.corners.scatter(), self.walls.scatter()
+        said = self._said_of_moving()
+        return Summary(
+            self.window,
+            len(self),
+            said or self.corners.trouble(corners),
+            tuple(CornerMethod(*claims) for claims in self.corners.claims(corners)),
+            WallSummary(
+                self.window,
+                len(self),
+                said or self.walls.trouble(walls),
+                tuple(WallMethod(*claims) for claims in self.walls.claims(walls)),
+            ),
+        )
+
+    def deviations(self, corner: int) -> dict[str, Array]:
+        """(N, 2) m by method: where it saw the corner of that id, from the mean over the window, the oldest first.
+
+        Raises EvaluationError for a corner that was not seen in the window.
+        """
+        return self.corners.deviations(corner)
+
+    def wall_deviations(self, wall: int) -> dict[str, Array]:
+        """(N, 2) rad, m by method: alpha and r of the wall of that id, from the mean over the window, oldest first.
+
+        Raises EvaluationError for a wall that was not seen in the window.
+        """
+        return self.walls.deviations(wall)
+
+    def _said_of_moving(self) -> str | None:
+        if not self._moved:
+            return None
+        scans = len(self)
+        ago = f"{scans} scan{'s' * (scans > 1)} ago" if scans else "just now"
+        return f"The sensor moved {ago}: the window began anew."
+
+
+def _corners_seen(found: Features) -> Array:
+    """(K, SIGHTING)"""
+    corners = found.corners
+    published, consistent = (
+        c.reshape(-1, 4) for c in (corners.covariance_published, corners.covariance_consistent)
+    )
+    return np.column_stack([corners.xy, published, consistent])
+
+
+def _walls_seen(found: Features, name: str, walls: Iterable[WallRow]) -> Array:
+    """(M, SIGHTING), each alpha next to that of the first sighting, so that it does not leap by a turn."""
+    lines = found.lines
+    seen = np.full((len(lines), SIGHTING), np.nan)
+    for row in walls:
+        i = row.index.get(name)
+        if i is not None:
+            line = lines[i]
+            alpha, r = unwrapped(line.alpha, line.r, row.near)
+            seen[i, :2] = alpha, r
+            turned = np.array([1.0, 1.0, 1.0, 1.0] if r >= 0 else [1.0, -1.0, -1.0, 1.0])
+            seen[i, 2:6] = turned * line.covariance_published.ravel()
+            seen[i, 6:] = turned * line.covariance_consistent.ravel()
+    return seen
+
+
+def _first(sightings: Observations) -> Array:
+    """(R, 2) of each sighting, by the first method that has it."""
+    table = sightings.table
+    first = np.isfinite(table[..., 0]).argmax(1)
+    pairs: Array = table[np.arange(len(table)), first, :2]
+    return pairs
+
+
+def _feet(lines: Array) -> Array:
+    """(R, 2) m, the points of lines (alpha, r) next to the sensor."""
+    feet: Array = lines[:, 1:] * np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
+    return feet

@@ -1,0 +1,6 @@
+"""What extraction, filter and landmark maps cost, beside yardsticks.
+
+What is public are these modules; each is imported on demand.
+"""
+
+__all__ = ["extraction", "filter", "landmarks", "repeatability"]

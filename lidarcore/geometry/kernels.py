@@ -1,0 +1,57 @@
+"""SE(2) and Mahalanobis distances for compiled code, on scalars and single poses; laws hold them to the rest."""
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.compiled import inlined, kernel
+from lidarcore.geometry.se2 import wrapped
+
+wrap = inlined(wrapped)
+
+
+@inlined
+def rotate(c: float, s: float, x: float, y: float) -> tuple[float, float]:
+    """A vector turned by the angle of cosine c and sine s: from frame b to frame a, if that is b's heading in a."""
+    return c * x - s * y, s * x + c * y
+
+
+@inlined
+def unrotate(c: float, s: float, x: float, y: float) -> tuple[float, float]:
+    """A vector turned back: from frame a to frame b."""
+    return c * x + s * y, c * y - s * x
+
+
+@kernel
+def compose_with_jacobians(T_a_b: Array, T_b_c: Array) -> tuple[Array, Array, Array]:
+    """T_a_c (3,) of two poses (3,) and its Jacobians (3, 3) by both."""
+    c, s = np.cos(T_a_b[2]), np.sin(T_a_b[2])
+    x, y = rotate(c, s, T_b_c[0], T_b_c[1])
+    F, G = np.eye(3), np.eye(3)
+    F[0, 2], F[1, 2] = -y, x
+    G[0, 0], G[0, 1], G[1, 0], G[1, 1] = c, -s, s, c
+    return np.array([T_a_b[0] + x, T_a_b[1] + y, wrap(T_a_b[2] + T_b_c[2])]), F, G
+
+
+@inlined
+def squared_mahalanobis_2d(u: float, v: float, xx: float, xy: float, yy: float) -> float:
+    """e^T C^-1 e of a difference (u, v) with the covariance [xx xy; xy yy]."""
+    return (yy * u * u - 2 * xy * u * v + xx * v * v) / (xx * yy - xy * xy)
+
+
+@kernel
+def squared_mahalanobis(difference: Array, covariance: Array) -> float:
+    """e^T C^-1 e of e (n,) and C (n, n), by Cholesky; NaN if C is not positive definite."""
+    n = len(difference)
+    L, y, total = np.empty((n, n)), np.empty(n), 0.0
+    for i in range(n):
+        for j in range(i + 1):
+            entry = covariance[i, j]
+            for k in range(j):
+                entry -= L[i, k] * L[j, k]
+            L[i, j] = np.sqrt(entry) if i == j else entry / L[j, j]
+        y[i] = difference[i]
+        for k in range(i):
+            y[i] -= L[i, k] * y[k]
+        y[i] /= L[i, i]
+        total += y[i] * y[i]
+    return total

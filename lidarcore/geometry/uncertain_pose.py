@@ -1,0 +1,55 @@
+"""Poses with covariances, and how errors travel along with them, to first order."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from lidarcore.arrays import Array
+from lidarcore.errors import CovarianceError
+from lidarcore.geometry.gaussian import check_covariance
+from lidarcore.geometry.se2 import (
+    compose,
+    compose_jacobians,
+    inverse,
+    inverse_jacobian,
+    relative,
+    relative_jacobians,
+)
+
+
+class UncertainPose(NamedTuple):
+    """T_a_b (..., 3) and the covariance (..., 3, 3) of its coordinates x, y, heading."""
+
+    pose: Array
+    covariance: Array
+
+    def compose(self, T_b_c: "UncertainPose") -> "UncertainPose":
+        """T_a_c, the errors of both poses being independent."""
+        F, G = compose_jacobians(self.pose, T_b_c.pose)
+        covariance = _carried(F, self.covariance) + _carried(G, T_b_c.covariance)
+        return UncertainPose(compose(self.pose, T_b_c.pose), covariance)
+
+    def inverse(self) -> "UncertainPose":
+        """T_b_a."""
+        return UncertainPose(inverse(self.pose), _carried(inverse_jacobian(self.pose), self.covariance))
+
+    def relative(self, T_a_c: "UncertainPose") -> "UncertainPose":
+        """T_b_c of poses in one frame with independent errors."""
+        A, B = relative_jacobians(self.pose, T_a_c.pose)
+        covariance = _carried(A, self.covariance) + _carried(B, T_a_c.covariance)
+        return UncertainPose(relative(self.pose, T_a_c.pose), covariance)
+
+
+def as_pose_covariance(values: ArrayLike, name: str) -> Array:
+    """The covariance (3, 3) of a pose. Raises CovarianceError if it is none."""
+    P = np.array(values, np.float64)
+    if P.shape != (3, 3):
+        raise CovarianceError(f"{name} has shape {P.shape}: give that of x, y and heading, (3, 3).")
+    check_covariance(P, name)
+    return P
+
+
+def _carried(J: Array, covariance: Array) -> Array:
+    carried: Array = J @ covariance @ np.swapaxes(J, -1, -2)
+    return carried

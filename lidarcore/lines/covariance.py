@@ -1,0 +1,200 @@
+"""How far off a line is: first-order covariances of a weighted regression under the noise of beams and walls.
+
+Errors of beams are independent, a wall's unevenness is not: it is an Ornstein-Uhlenbeck process along the wall, with
+the covariance s² exp(-|t_i - t_j| / L), and sums over all pairs of beams follow from one pass along it.
+"""
+
+import numpy as np
+
+from lidarcore.compiled import inlined
+from lidarcore.lines.line import Array
+from lidarcore.lines.regression import Normal, Sym2, Work
+from lidarcore.noise import NoiseModel
+
+_PRIOR_WEIGHT = 4.0  # of a room's unevenness against the independent stretches of one wall
+_GROSS = 9.0  # variances: a residual counts for no more in a wall's own unevenness
+
+Regression = tuple[float, float, float]  # sum of weights, weighted mean of t, centred second moment of t
+
+
+@inlined
+def covariances(
+    work: Work, rho: Array, c: Array, s: Array, noise: NoiseModel, normal: Normal, robust: bool
+) -> tuple[Sym2, Sym2]:
+    """Sandwich covariances of (alpha, r) for a regression with the weights work[0]: of repetition, and of truth.
+
+    To first order every fitter here minimises sum w (e + dalpha t - dr)², e the distance of a point from the line
+    and t its coordinate along it; they differ by w only. With A the normal matrix and B the same sum weighted by
+    w² v, v the effective variance, the covariance is A^-1 B A^-1. Robust weights of Student's t widen it.
+
+    work is scratch behind the weights.
+    """
+    w = work[0]
+    nx, ny, _ = normal
+    a0 = a1 = a2 = b0 = b1 = b2 = 0.0
+    middle = len(rho) // 2
+    t0 = rho[middle] * (nx * s[middle] - ny * c[middle])
+    for i in range(len(rho)):
+        across, along = nx * c[i] + ny * s[i], nx * s[i] - ny * c[i]
+        t = rho[i] * along
+        square = rho[i] * rho[i]
+        v = (noise.v_rho + noise.growth * square * square) * across * across + noise.v_theta * t * t
+        t -= t0
+        wwv = w[i] * w[i] * v
+        a0 += w[i]
+        a1 += w[i] * t
+        a2 += w[i] * t * t
+        b0 += wwv
+        b1 += wwv * t
+        b2 += wwv * t * t
+    mean = a1 / a0
+    d = a2 - a1 * mean  # sum of w (t - mean)^2
+    # Moments of w² v about the mean, then G = (dalpha, dr at the mean); dr at t = 0 adds mean * dalpha.
+    b2 = b2 - 2 * mean * b1 + mean * mean * b0
+    b1 = b1 - mean * b0
+    mean += t0
+    white = (b2 / (d * d), -b1 / (a0 * d), b0 / (a0 * a0))
+    if robust:
+        white = (white[0] + noise.widened / d, white[1], white[2] + noise.widened / a0)
+    if noise.v_wall == 0 and noise.v_systematic == 0:
+        here = _at_sensor(white, mean)
+        return here, here
+    pattern, elsewhere, off = _pattern(work, rho, c, s, noise, normal, (a0, mean, d), white)
+    anew = _mixed(white, noise.renewal, pattern, (1 - noise.renewal) * noise.resampling, elsewhere)
+    half, t_m = off
+    tilt = noise.v_systematic / (half * half)
+    lever = t_m - mean  # of the wall's middle, about which it is tilted
+    truth = (
+        white[0] + pattern[0] + tilt,
+        white[1] + pattern[1] + lever * tilt,
+        white[2] + pattern[2] + noise.v_systematic + lever * lever * tilt,
+    )
+    return _at_sensor(anew, mean), _at_sensor(truth, mean)
+
+
+@inlined
+def _mixed(white: Sym2, p: float, pattern: Sym2, q: float, elsewhere: Sym2) -> Sym2:
+    """white + p pattern + q elsewhere"""
+    return (
+        white[0] + p * pattern[0] + q * elsewhere[0],
+        white[1] + p * pattern[1] + q * elsewhere[1],
+        white[2] + p * pattern[2] + q * elsewhere[2],
+    )
+
+
+@inlined
+def _at_sensor(about_mean: Sym2, mean: float) -> Sym2:
+    """Of (alpha, r) from that of (alpha, height of the line over t = mean)."""
+    aa, am, mm = about_mean
+    return aa, am + mean * aa, mm + 2 * mean * am + mean * mean * aa
+
+
+@inlined
+def _pattern(
+    work: Work,
+    rho: Array,
+    c: Array,
+    s: Array,
+    noise: NoiseModel,
+    normal: Normal,
+    sums: Regression,
+    white: Sym2,
+) -> tuple[Sym2, Sym2, tuple[float, float]]:
+    """Covariances of (alpha, height over the mean) by this wall's unevenness: of all of it, and of what beams that fall
+    elsewhere on it make of it; and half the wall's length and its middle (m)."""
+    w, t, decay = work
+    nx, ny, r = normal
+    a0, mean, d = sums
+    n = len(rho)
+    residual = expected = 0.0
+    for i in range(n):
+        across, along = nx * c[i] + ny * s[i], nx * s[i] - ny * c[i]
+        at = r * along / across - mean
+        t[i] = at
+        e = rho[i] * across - r
+        square = rho[i] * rho[i]
+        v = (noise.v_rho + noise.growth * square * square) * across * across + noise.v_theta * (
+            at + mean
+        ) ** 2
+        residual += w[i] * min(e * e, _GROSS * (v + noise.v_wall))
+        expected += w[i] * v
+    k00, k01, k11 = unevenness_sums(w, t, decay, noise.length)
+    # The wall's own variance, from what its residuals have beyond the beams' noise; a line takes out a part of both.
+    seen = residual - (expected - white[2] * a0 - white[0] * d)
+    of_wall = a0 - k00 / a0 - k11 / d
+    stretches = a0 * a0 / k00
+    own = max(seen / of_wall, 0.0) if of_wall > 0.01 * a0 else noise.v_wall
+    told = max(stretches - 2.0, 0.0)
+    v_wall = (_PRIOR_WEIGHT * noise.v_wall + told * own) / (_PRIOR_WEIGHT + told)
+    pattern = _gained(v_wall, k00, k01, k11, a0, d)
+    elsewhere = pattern
+    if noise.renewal < 1 and noise.resampling > 0:
+        l00, l01, l11 = resampled_sums(w, t, noise.length)
+        elsewhere = _gained(v_wall, l00, l01, l11, a0, d)
+    return pattern, elsewhere, (np.abs(t[n - 1] - t[0]) / 2, (t[n - 1] + t[0]) / 2 + mean)
+
+
+@inlined
+def _gained(v: float, k00: float, k01: float, k11: float, a0: float, d: float) -> Sym2:
+    """Of (alpha, height over the mean), by sums over errors of variance v."""
+    return v * k11 / (d * d), -v * k01 / (a0 * d), v * k00 / (a0 * a0)
+
+
+@inlined
+def resampled_sums(w: Array, t: Array, length: float) -> tuple[float, float, float]:
+    """The same sums as `unevenness_sums` of what differs if all beams fall elsewhere between their neighbours.
+
+    With a = spacing / (2 length), and a shift of all beams that is anywhere within the spacing, the covariance of two
+    such samples of one wall is that of the process times sinh(a) / a, but (1 - exp(-a)) / a of a beam with itself. What
+    they do not share, summed over the neighbours, is a variance of coth(a) - 1 / a for each beam, independent: a / 3
+    where beams are dense, which hardly miss anything between them, 1 where they are far apart.
+    """
+    n = len(t)
+    l00 = l01 = l11 = 0.0
+    for i in range(n):
+        before, after = max(i - 1, 0), min(i + 1, n - 1)
+        a = np.abs(t[after] - t[before]) / ((after - before) * 2 * length)
+        x = a * a
+        v = w[i] * w[i] * min(a * (35 + x) / (105 + 10 * x), 1.0)  # continued fraction of Langevin's function
+        l00 += v
+        l01 += v * t[i]
+        l11 += v * t[i] * t[i]
+    return l00, l01, l11
+
+
+@inlined
+def unevenness_sums(w: Array, t: Array, decay: Array, length: float) -> tuple[float, float, float]:
+    """Sums over all i, j of a_i b_j exp(-|t_i - t_j| / length) for (a, b) = (w, w), (w, w t) and (w t, w t).
+
+    t (N,) is in the order of the wall; decay (N,) is scratch. What is left of all beams before decays from one to the
+    next: O(N) instead of O(N²).
+    """
+    n = len(t)
+    for i in range(1, n):
+        decay[i] = _exp_negative(np.abs(t[i] - t[i - 1]) / length)
+    p = q = 0.0
+    k00, k01, k11 = w[0] * w[0], w[0] * w[0] * t[0], w[0] * w[0] * t[0] * t[0]
+    for i in range(1, n):
+        wt = w[i] * t[i]
+        before = decay[i] * w[i - 1]
+        p, q = decay[i] * p + before, decay[i] * q + before * t[i - 1]
+        k00 += w[i] * (w[i] + 2 * p)
+        k01 += wt * (w[i] + p) + w[i] * q
+        k11 += wt * (wt + 2 * q)
+    return k00, k01, k11
+
+
+@inlined
+def _exp_negative(x: float) -> float:
+    """exp(-x) for x >= 0, to 1e-11: a loop of it vectorises.
+
+    Taylor's polynomial of exp(-y), y = x / 64 < 1/2, to the power of 64.
+    """
+    y = min(x, 30.0) / 64
+    z = 1 - y * (1 - y / 2 * (1 - y / 3 * (1 - y / 4 * (1 - y / 5 * (1 - y / 6 * (1 - y / 7))))))
+    z *= z
+    z *= z
+    z *= z
+    z *= z
+    z *= z
+    return z * z

@@ -1,0 +1,67 @@
+"""Takes the distortion out of a scan whose sensor moved and turned while it was measuring."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidarcore.errors import LocalizationError
+from lidarcore.geometry import wrap
+from lidarcore.localization.dead_reckoning import Velocity
+from lidarcore.localization.points import Points
+from lidarcore.scan import Array, Scan
+
+
+class Distortion:
+    """What the motion of the sensor did to the newest scan, as far as it was taken out.
+
+    stamp, velocity  of the scan that was deskewed last, NaN if none was, and by what
+    """
+
+    def __init__(self) -> None:
+        self.stamp = np.nan
+        self.velocity: Velocity = (0.0, 0.0, 0.0)
+
+    def remove(self, scan: Scan, velocity: Velocity | None) -> Scan:
+        """The scan without it; as it is if the velocity or the times of the beams are not known."""
+        if velocity is None or scan.beam_times is None or not np.isfinite(scan.beam_times).all():
+            return scan
+        self.stamp, self.velocity = scan.stamp, velocity
+        return deskew(scan, *velocity)
+
+    def restore(self, points: Points, times: Array, stamp: float) -> Points:
+        """Points (K,) of what `remove` gave for the scan of this stamp, as they were seen at times (K,) s after it."""
+        return skew(points, times, *self.velocity) if stamp == self.stamp else points
+
+
+def deskew(scan: Scan, v: float, w: float, u: float = 0.0) -> Scan:
+    """The scan as a sensor would see it that stands where this one was at `stamp`; it needs beam times.
+
+    v m/s ahead, u m/s to the left and w rad/s, constant during the revolution: each point is carried along the arc
+    that the sensor had covered when its beam was measured.
+    Raises LocalizationError if the scan has no finite beam times, or a speed is not finite.
+    """
+    if scan.beam_times is None or not np.isfinite(scan.beam_times).all():
+        raise LocalizationError("The scan has no beam times: without them its distortion cannot be removed.")
+    if not np.isfinite([v, w, u]).all():
+        raise LocalizationError(f"The speed is {v} and {u} m/s and {w} rad/s: give finite numbers.")
+    moved, turned = _arcs(scan.beam_times, v, w, u)
+    points = moved + scan.ranges * np.exp(1j * (scan.bearings + turned))
+    bearings = np.where(scan.valid, np.angle(points), wrap(scan.bearings + turned))
+    return replace(scan, ranges=np.abs(points), bearings=bearings)
+
+
+def skew(points: Points, times: Array, v: float, w: float, u: float) -> Points:
+    """Points (K,) of a deskewed scan as the sensor saw them at times (K,) s after the stamp, from where it was then."""
+    moved, turned = _arcs(times, v, w, u)
+    back = np.exp(-1j * turned)
+    seen = (points.xy @ [1, 1j] - moved) * back
+    R = np.stack([np.stack([back.real, -back.imag], -1), np.stack([back.imag, back.real], -1)], -2)
+    return points.with_new(np.stack([seen.real, seen.imag], -1), R @ points.covariance @ R.transpose(0, 2, 1))
+
+
+def _arcs(times: Array, v: float, w: float, u: float) -> tuple[NDArray[np.complex128], Array]:
+    """Where the sensor has moved after times (K,) s, as x + iy m, and the angle it has turned, rad."""
+    turned = w * times
+    # The chord of the arc of angle a is sin(a / 2) / (a / 2) long and points half-way round the turn.
+    return (v + 1j * u) * times * np.sinc(turned / (2 * np.pi)) * np.exp(0.5j * turned), turned

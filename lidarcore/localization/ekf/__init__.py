@@ -1,0 +1,1 @@
+"""The extended Kalman filters: state, motion, association and correction [EKF 14-26]."""

@@ -1,0 +1,224 @@
+"""The arithmetic of the filters on plain arrays, compiled [EKF 14-26].
+
+A Gaussian is a mean x (>= n,) and a covariance P (>= n, >= n) of which the first n count; its first three entries
+are T_world_sensor. Both are changed in place.
+"""
+
+import numpy as np
+
+from lidarcore.compiled import inlined, kernel
+from lidarcore.geometry.kernels import squared_mahalanobis_2d, unrotate, wrap
+from lidarcore.scan import Array, Ints
+
+
+@kernel
+def odometry_variances(increment: Array, dt: float, noise: Array) -> tuple[float, float, float]:
+    """Variances of an increment (3,) m, m, rad over dt s, in the sensor frame before it, from OdometryNoise.table."""
+    way, turn = np.hypot(increment[0], increment[1]), np.abs(increment[2])
+    slip = noise[4] ** 2 * turn + noise[5] ** 2 * dt
+    heading = noise[2] ** 2 * way + noise[3] ** 2 * turn + noise[6] ** 2 * dt
+    return noise[0] ** 2 * way + slip, noise[1] ** 2 * way + slip, heading
+
+
+@kernel
+def propagate(x: Array, P: Array, n: int, state: Array, F: Array, Q: Array) -> None:
+    """Put a predicted state (d,) in place of the first d entries: F (d, d) is its Jacobian, Q (d, d) the noise."""
+    d = len(state)
+    FP = np.zeros((d, n))
+    for i in range(d):
+        for k in range(d):
+            if F[i, k] != 0.0:
+                for j in range(n):
+                    FP[i, j] += F[i, k] * P[k, j]
+    for i in range(d):
+        x[i] = state[i]
+        for j in range(d, n):
+            P[i, j] = P[j, i] = FP[i, j]
+        for j in range(i + 1):
+            entry = Q[i, j]
+            for k in range(d):
+                entry += FP[i, k] * F[j, k]
+            P[i, j] = P[j, i] = entry
+
+
+@kernel
+def expect(pose: Array, P: Array, xy: Array, cross: Array, own: Array) -> tuple[Array, Array]:
+    """Where landmarks xy (L, 2) m appear in the sensor frame (L, 2), and how uncertain that is (L, 2, 2) [EKF 18-20].
+
+    P (>= 3, >= 3) is the covariance of the pose, cross (L, 3, 2) that of pose and landmark, own (L, 2, 2) theirs.
+    """
+    L = len(xy)
+    z, S = np.empty((L, 2)), np.empty((L, 2, 2))
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    for i in range(L):
+        # An error of m - p - R z in world axes is that of the landmark less [1 0 -dy; 0 1 dx] times that of the pose.
+        dx, dy, X = xy[i, 0] - pose[0], xy[i, 1] - pose[1], cross[i]
+        a = own[i, 0, 0] + P[0, 0] - 2 * dy * P[0, 2] + dy * dy * P[2, 2] - 2 * (X[0, 0] - dy * X[2, 0])
+        d = own[i, 1, 1] + P[1, 1] + 2 * dx * P[1, 2] + dx * dx * P[2, 2] - 2 * (X[1, 1] + dx * X[2, 1])
+        b = own[i, 0, 1] + P[0, 1] + dx * P[0, 2] - dy * P[1, 2] - dx * dy * P[2, 2]
+        b -= X[0, 1] - dy * X[2, 1] + X[1, 0] + dx * X[2, 0]
+        z[i, 0], z[i, 1] = unrotate(c, s, dx, dy)
+        S[i, 0, 0] = c * c * a + 2 * c * s * b + s * s * d
+        S[i, 1, 1] = s * s * a - 2 * c * s * b + c * c * d
+        S[i, 0, 1] = S[i, 1, 0] = (c * c - s * s) * b + c * s * (d - a)
+    return z, S
+
+
+@kernel
+def all_squared_distances(xy: Array, noise: Array, z: Array, S: Array) -> Array:
+    """Squared Mahalanobis distances (K, L) of sightings xy (K, 2) and landmarks expected at z (L, 2).
+
+    noise (K, 2, 2) and S (L, 2, 2) are their covariances.
+    """
+    distances = np.empty((len(xy), len(z)))
+    for k in range(len(xy)):
+        for i in range(len(z)):
+            a, b, d = S[i, 0, 0] + noise[k, 0, 0], S[i, 0, 1] + noise[k, 0, 1], S[i, 1, 1] + noise[k, 1, 1]
+            u, v = xy[k, 0] - z[i, 0], xy[k, 1] - z[i, 1]
+            distances[k, i] = squared_mahalanobis_2d(u, v, a, b, d)
+    return distances
+
+
+@kernel
+def within_any(distances: Array, gate: float) -> Ints:
+    """Columns (N,) of squared distances (K, L) with one under the gate."""
+    within = np.zeros(distances.shape[1], np.bool_)
+    for k in range(distances.shape[0]):
+        within |= distances[k] <= gate
+    return np.flatnonzero(within)
+
+
+@kernel
+def near_pairs(xy: Array, first: Ints, second: Ints, apart: float) -> list[tuple[int, int]]:
+    """Pairs of one of the first and one of the second points whose coordinates xy (L, 2) differ by less than apart."""
+    pairs = [(0, 0) for _ in range(0)]
+    for i in first:
+        for j in second:
+            if np.abs(xy[i, 0] - xy[j, 0]) < apart and np.abs(xy[i, 1] - xy[j, 1]) < apart:
+                pairs.append((i, j))
+    return pairs
+
+
+@inlined
+def _apart(row: Array, r: int) -> tuple[float, float]:
+    """Entries of the landmark, if r >= 0 and it is not given, less those of the pose."""
+    if r >= 0:
+        return row[r] - row[0], row[r + 1] - row[1]
+    return -row[0], -row[1]
+
+
+@inlined
+def _seen(
+    c: float, s: float, u: float, v: float, apart: tuple[float, float], turn: float
+) -> tuple[float, float]:
+    """H times a column: what its entries, apart and of the heading, do to a sighting at (u, v) m, sensor frame."""
+    x, y = unrotate(c, s, apart[0], apart[1])
+    return x + v * turn, y - u * turn
+
+
+@kernel
+def innovation_covariance(x: Array, P: Array, z: Array, noise: Array, rows: Ints) -> Array:
+    """S (2 K, 2 K) of sightings expected at z (K, 2), of landmarks in these rows (K,) of x, or -1 if they are given."""
+    K = len(rows)
+    S, PHt = np.empty((2 * K, 2 * K)), np.empty((2, len(P)))
+    c, s = np.cos(x[2]), np.sin(x[2])
+    for k in range(K):
+        for other in range(k, K):
+            q = rows[other]
+            for i in (0, 1, 2, q, q + 1) if q >= 0 else (0, 1, 2, 0, 0):
+                PHt[0, i], PHt[1, i] = _seen(c, s, z[k, 0], z[k, 1], _apart(P[i], rows[k]), P[i, 2])
+            for a in range(2):
+                row = _seen(c, s, z[other, 0], z[other, 1], _apart(PHt[a], q), PHt[a, 2])
+                for b in range(2):
+                    S[2 * k + a, 2 * other + b] = S[2 * other + b, 2 * k + a] = row[b]
+        for a in range(2):
+            for b in range(a + 1):
+                entry = S[2 * k + b, 2 * k + a] + noise[k, a, b]
+                S[2 * k + a, 2 * k + b] = S[2 * k + b, 2 * k + a] = entry
+    return S
+
+
+@kernel
+def correct(x: Array, P: Array, n: int, z: Array, innovation: Array, noise: Array, rows: Ints) -> None:
+    """Add what sightings expected at z (K, 2) tell, one after the other, all linearised at the state before them.
+
+    innovation (K, 2) and noise (K, 2, 2), sensor frame; the landmarks are in these rows (K,) of x, or -1 if they
+    are given. With S = C C^T and W = P H^T C^-T, P - W W^T stays symmetric whatever the rounding [EKF 21].
+    """
+    c, s = np.cos(x[2]), np.sin(x[2])
+    change, W = np.zeros(n), np.empty((2, n))
+    for k in range(len(rows)):
+        u, v, r = z[k, 0], z[k, 1], rows[k]
+        for j in range(n):
+            dx, dy = -P[0, j], -P[1, j]
+            if r >= 0:
+                dx, dy = dx + P[r, j], dy + P[r + 1, j]
+            W[0, j], W[1, j] = _seen(c, s, u, v, (dx, dy), P[2, j])
+        a, b = _seen(c, s, u, v, _apart(W[0], r), W[0, 2])
+        _, d = _seen(c, s, u, v, _apart(W[1], r), W[1, 2])
+        known = _seen(c, s, u, v, _apart(change, r), change[2])
+        inv_00 = 1 / np.sqrt(a + noise[k, 0, 0])
+        C_10 = (b + noise[k, 0, 1]) * inv_00
+        inv_11 = 1 / np.sqrt(d + noise[k, 1, 1] - C_10 * C_10)
+        first = (innovation[k, 0] - known[0]) * inv_00
+        second = (innovation[k, 1] - known[1] - C_10 * first) * inv_11
+        for j in range(n):
+            W[0, j] *= inv_00
+            W[1, j] = (W[1, j] - C_10 * W[0, j]) * inv_11
+            change[j] += W[0, j] * first + W[1, j] * second
+        for i in range(n):
+            p, q = W[0, i], W[1, i]
+            for j in range(n):
+                P[i, j] -= p * W[0, j] + q * W[1, j]
+    for j in range(n):
+        x[j] += change[j]
+    x[2] = wrap(x[2])
+
+
+@kernel
+def survey(
+    x: Array, P: Array, rows: Ints, slots: Ints, coefficients: Ints, x_0: Array, base: Array, own_0: Array
+) -> tuple[Array, Array, Array]:
+    """Means (N, 2), covariances with the pose (N, 3, 2) and own (N, 2, 2) of landmarks in the rows (N,) of x.
+
+    Where a row is -1, they are those of slots (N,) in the passive part: x_0 + base^T theta and base^T Phi^T.
+    """
+    N, n = len(rows), len(x_0)
+    xy, cross, own = np.empty((N, 2)), np.empty((N, 3, 2)), np.empty((N, 2, 2))
+    followed = np.zeros((4, n))
+    if N and rows.min() < 0:
+        for k in range(len(coefficients)):
+            r = coefficients[k]
+            a, b, c, theta = P[0, r], P[1, r], P[2, r], x[r]
+            for j in range(n):
+                entry = base[k, j]
+                followed[0, j] += a * entry
+                followed[1, j] += b * entry
+                followed[2, j] += c * entry
+                followed[3, j] += theta * entry
+    for i in range(N):
+        r, s = rows[i], slots[i]
+        for a in range(2):
+            if r >= 0:
+                xy[i, a] = x[r + a]
+                for k in range(3):
+                    cross[i, k, a] = P[k, r + a]
+                for b in range(2):
+                    own[i, a, b] = P[r + a, r + b]
+            else:
+                xy[i, a] = x_0[2 * s + a] + followed[3, 2 * s + a]
+                for k in range(3):
+                    cross[i, k, a] = followed[k, 2 * s + a]
+                for b in range(2):
+                    own[i, a, b] = own_0[s, a, b]
+    return xy, cross, own
+
+
+@kernel
+def subtract_products(blocks: Array, A: Array, B: Array) -> None:
+    """Subtract from blocks (n / 2, 2, 2) those on the diagonal of A^T B, A and B (k, n)."""
+    for k in range(len(A)):
+        for i in range(len(blocks)):
+            for a in range(2):
+                for b in range(2):
+                    blocks[i, a, b] -= A[k, 2 * i + a] * B[k, 2 * i + b]

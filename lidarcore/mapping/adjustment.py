@@ -1,0 +1,230 @@
+"""What all patches of all keyframes say about their poses, the surfaces being unknown as well.
+
+Surfaces are cut into cells. In each, what the keyframes saw is a line of unknown place and direction, which is
+eliminated: what remains ties all keyframes that saw it to each other, each piece of information used once
+[Triggs et al. 2000; Liu & Zhang, BALM, RA-L 2021].
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import coo_array, csr_array
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.compiled import kernel
+from lidarcore.mapping.cells import cells
+
+_GAP = 0.15  # m between two surfaces side by side
+_TILT = 0.1  # rad by which the line of a cell may be turned from the mean of its normals
+_OUTLIER = 9.0  # squared standard deviations from which on a patch counts less
+_PASSES = 4  # over a cell, until outliers no longer move its line
+
+
+class Sightings(NamedTuple):
+    """M patches, sorted by the cells that they lie in and by keyframe.
+
+    keyframes  (M,) which keyframe saw each
+    means      (M, 2) m, frame of the keyframe
+    normals    (M, 2)
+    variances  (M,) m² of noise
+    """
+
+    keyframes: Ints
+    means: Array
+    normals: Array
+    variances: Array
+
+
+class Sums(NamedTuple):
+    """The normal equations of K poses, without the lines of the cells, and what is left of each group.
+
+    information  (3 K, 3 K) sparse
+    gradient     (3 K,)
+    groups       (G, 3) of the patches of one keyframe in one cell: squared residual of their mean, its variance by
+                 noise alone, and the share of it that the line did not take up
+    """
+
+    information: csr_array
+    gradient: Array
+    groups: Array
+
+
+def normal_equations(
+    seen: Sightings, poses: Array, size: float, scale: float, unevenness: float
+) -> tuple[Sums, int]:
+    """The normal equations at poses (K, 3), and how many cells were seen by several keyframes.
+
+    The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
+    """
+    c, s = np.cos(poses[seen.keyframes, 2]), np.sin(poses[seen.keyframes, 2])
+    turned = [
+        np.stack([c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1]], -1)
+        for v in (seen.means, seen.normals)
+    ]
+    arms, normals = turned
+    order, starts = _ordered(arms + poses[seen.keyframes, :2], normals, size, seen.keyframes)
+    K, G = len(poses), len(order)
+    D, g = np.zeros((K, 3, 3)), np.zeros((K, 3))
+    U, at, groups = np.empty((G, 3, 2)), np.empty((G, 2), np.int64), np.empty((G, 3))
+    number, shared = _sum(
+        seen.keyframes[order], poses, arms[order], normals[order], seen.variances[order], starts,
+        scale, unevenness**2, D, g, U, at, groups,
+    )  # fmt: skip
+    return Sums(_sparse(D, U[:number], at[:number], shared), g.ravel(), groups[:number]), shared
+
+
+def _ordered(places: Array, normals: Array, size: float, keyframes: Ints) -> tuple[Ints, Ints]:
+    """Order of patches by cell and keyframe, and where each cell begins, with the end."""
+    number = cells(places, normals, size, _GAP)
+    order = np.lexsort([keyframes, number])
+    return order, np.append(np.flatnonzero(np.diff(number[order], prepend=-1)), len(order))
+
+
+def _sparse(D: Array, U: Array, at: Ints, lines: int) -> csr_array:
+    """D less U U^T."""
+    K = len(D)
+    rows = (3 * at[:, 0, None, None] + np.arange(3)[:, None] + 0 * np.arange(2)).ravel()
+    columns = (2 * at[:, 1, None, None] + 0 * np.arange(3)[:, None] + np.arange(2)).ravel()
+    tall = coo_array((U.ravel(), (rows, columns)), shape=(3 * K, 2 * lines)).tocsr()
+    index = 3 * np.arange(K)[:, None, None] + np.zeros((3, 3), np.int64)
+    diagonal = coo_array(
+        (D.ravel(), ((index + np.arange(3)[:, None]).ravel(), (index + np.arange(3)).ravel())),
+        shape=(3 * K, 3 * K),
+    )
+    return csr_array(diagonal.tocsr() - tall @ tall.T)
+
+
+@kernel
+def _sum(
+    keyframes: Ints,
+    poses: Array,
+    arms: Array,
+    normals: Array,
+    variances: Array,
+    starts: Ints,
+    scale: float,
+    shared: float,
+    D: Array,
+    g: Array,
+    U: Array,
+    at: Ints,
+    groups: Array,
+) -> tuple[int, int]:
+    """Adds up the cells that several keyframes saw; returns the number of groups and of cells."""
+    number, lines = 0, 0
+    N, m, S = np.empty((2, 2)), np.empty(2), np.empty((3, 2))
+    weights, r, t = np.empty(len(keyframes)), np.empty(len(keyframes)), np.empty(len(keyframes))
+    for cell in range(len(starts) - 1):
+        low, high = starts[cell], starts[cell + 1]
+        if keyframes[low] == keyframes[high - 1]:
+            continue
+        nx, ny = _line(keyframes, poses, arms, normals, low, high, r, t)
+        _weigh(keyframes, variances, scale, shared, low, high, weights)
+        a, b = _fit(keyframes, variances, scale, shared, low, high, r, t, weights, N, m)
+        det = N[0, 0] * N[1, 1] - N[0, 1] * N[0, 1]
+        l00 = np.sqrt(N[1, 1] / det)  # N^-1 = L L^T
+        l10 = -N[0, 1] / det / l00
+        l11 = np.sqrt(max(N[0, 0] / det - l10 * l10, 0.0))
+        i = low
+        while i < high:
+            k, j = keyframes[i], i
+            S[:] = 0.0
+            mean, noise, lever, total = 0.0, 0.0, 0.0, 0.0
+            while j < high and keyframes[j] == k:
+                w, left = weights[j], r[j] - a - b * t[j]
+                J = nx, ny, ny * arms[j, 0] - nx * arms[j, 1]
+                for p in range(3):
+                    g[k, p] += w * J[p] * left
+                    S[p, 0] += w * J[p]
+                    S[p, 1] += w * J[p] * t[j]
+                    for q in range(3):
+                        D[k, p, q] += w * J[p] * J[q]
+                mean += left / variances[j]
+                noise += 1 / variances[j]
+                lever += w * t[j]
+                total += w
+                j += 1
+            for p in range(3):
+                U[number, p, 0] = S[p, 0] * l00 + S[p, 1] * l10
+                U[number, p, 1] = S[p, 1] * l11
+            at[number, 0], at[number, 1] = k, lines
+            lever /= max(total, 1e-12)
+            taken = total * (N[1, 1] - 2 * N[0, 1] * lever + N[0, 0] * lever * lever) / det
+            groups[number, 0], groups[number, 1] = (mean / noise) ** 2, 1 / noise
+            groups[number, 2] = 1 - taken
+            number += 1
+            i = j
+        lines += 1
+    return number, lines
+
+
+@kernel
+def _line(
+    keyframes: Ints, poses: Array, arms: Array, normals: Array, low: int, high: int, r: Array, t: Array
+) -> tuple[float, float]:
+    """Mean normal of a cell, and how far its patches lie across and along, from their middle."""
+    nx = ny = x = y = 0.0
+    for i in range(low, high):
+        nx += normals[i, 0]
+        ny += normals[i, 1]
+        x += poses[keyframes[i], 0] + arms[i, 0]
+        y += poses[keyframes[i], 1] + arms[i, 1]
+    x, y, norm = x / (high - low), y / (high - low), np.hypot(nx, ny)
+    nx, ny = nx / norm, ny / norm
+    for i in range(low, high):
+        u, v = poses[keyframes[i], 0] + arms[i, 0] - x, poses[keyframes[i], 1] + arms[i, 1] - y
+        r[i], t[i] = nx * u + ny * v, nx * v - ny * u
+    return nx, ny
+
+
+@kernel
+def _weigh(
+    keyframes: Ints, variances: Array, scale: float, shared: float, low: int, high: int, weights: Array
+) -> None:
+    """Weight of each patch: its noise, and what it shares with the others of its group."""
+    i = low
+    while i < high:
+        j = i
+        while j < high and keyframes[j] == keyframes[i]:
+            j += 1
+        for k in range(i, j):
+            weights[k] = 1 / (scale * variances[k] + (j - i) * shared)
+        i = j
+
+
+@kernel
+def _fit(
+    keyframes: Ints,
+    variances: Array,
+    scale: float,
+    shared: float,
+    low: int,
+    high: int,
+    r: Array,
+    t: Array,
+    weights: Array,
+    N: Array,
+    m: Array,
+) -> tuple[float, float]:
+    """Robust line r = a + b t; leaves the weights and the information N (2, 2) that it ended with."""
+    a = b = 0.0
+    for turn in range(_PASSES):
+        N[:], m[:] = 0.0, 0.0
+        N[1, 1] = 1 / _TILT**2
+        for i in range(low, high):
+            w = weights[i]
+            N[0, 0] += w
+            N[0, 1] += w * t[i]
+            N[1, 1] += w * t[i] * t[i]
+            m[0] += w * r[i]
+            m[1] += w * r[i] * t[i]
+        N[1, 0] = N[0, 1]
+        det = N[0, 0] * N[1, 1] - N[0, 1] * N[0, 1]
+        a, b = (N[1, 1] * m[0] - N[0, 1] * m[1]) / det, (N[0, 0] * m[1] - N[0, 1] * m[0]) / det
+        if turn < _PASSES - 1:
+            _weigh(keyframes, variances, scale, shared, low, high, weights)
+            for i in range(low, high):
+                off = (r[i] - a - b * t[i]) ** 2 / (scale * variances[i] + shared)
+                if off > _OUTLIER:
+                    weights[i] *= (_OUTLIER / off) ** 2
+    return a, b

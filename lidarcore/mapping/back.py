@@ -1,0 +1,96 @@
+"""The back end: keyframes become nodes of a pose graph, loops bend it."""
+
+import threading
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import compose, pose_difference, relative
+from lidarcore.mapping.consistency import Loop
+from lidarcore.mapping.front import Tracked
+from lidarcore.mapping.keyframes import Keyframe
+from lidarcore.mapping.loops import LoopFinder
+from lidarcore.mapping.pose_graph import PoseGraph
+from lidarcore.mapping.refinement import Refined, Step, refine
+from lidarcore.mapping.settings import MapperSettings
+from lidarcore.mapping.sight import sight
+
+_AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map
+_SETTLED = 0.01  # m and rad of the last step, after which the poses are far better than that
+
+
+class Snapshot(NamedTuple):
+    """The map as it was after a keyframe: K keyframes, their poses (K, 3), and the loops believed; never changed."""
+
+    keyframes: tuple[Keyframe, ...]
+    poses: Array
+    loops: tuple[Loop, ...]
+
+
+class BackEnd:
+    """A pose graph of keyframes that closes loops.
+
+    lock      held while keyframes are added; what does not hold it may read the snapshot only
+    snapshot  the map after the last keyframe
+    graph     PoseGraph of the keyframes
+    loops  the loops that were believed
+    steps  how each keyframe was reached, by motion alone
+    """
+
+    def __init__(self, settings: MapperSettings) -> None:
+        self._settings = settings
+        self.lock = threading.Lock()
+        self.snapshot = Snapshot((), np.empty((0, 3)), ())
+        self.graph = PoseGraph()
+        self.loops: list[Loop] = []
+        self.keyframes: list[Keyframe] = []
+        self.steps: list[Step] = []
+        self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
+
+    def add(self, tracked: Tracked, search: bool = True) -> None:
+        """Append a keyframe, and bend the map if it closes loops; search=False leaves them for later."""
+        keyframe = Keyframe(tracked.scan, tracked.patches, sight(tracked.scan))
+        with self.lock:
+            self._add(tracked, keyframe, search)
+            self.snapshot = Snapshot(tuple(self.keyframes), self.graph.poses, tuple(self.loops))
+
+    def _add(self, tracked: Tracked, keyframe: Keyframe, search: bool) -> None:
+        self.keyframes.append(keyframe)
+        if len(self.keyframes) == 1:
+            return
+        pose, P = tracked.tie
+        node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
+        self.steps.append(Step(tracked.node, node, *tracked.moved))
+        self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
+        if search:
+            self._close(self._finder.find(node))
+
+    def search_again(self) -> int:
+        """Look for loops at all keyframes, now that the map is better. Returns how many were closed."""
+        again = sum(self._close(self._finder.find(node)) for node in range(1, len(self.graph)))
+        return again + self._close(self._finder.conclude())
+
+    def refine(self) -> Refined:
+        """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""
+        self.graph.optimize()
+        scans = [keyframe.patches for keyframe in self.keyframes]
+        refined = refine(scans, self.graph.poses, self.steps, self._settings.cell)
+        self.graph.move(refined.poses)
+        self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
+        self.snapshot = Snapshot(tuple(self.keyframes), refined.poses, tuple(self.loops))
+        return refined
+
+    def _close(self, loops: list[Loop]) -> int:
+        for loop in loops:
+            self.graph.connect(loop.i, loop.j, loop.pose, loop.covariance, doubted=True)
+        self.loops += loops
+        if loops:
+            self.graph.optimize(_SETTLED)
+        return len(loops)
+
+
+def _agrees(loop: Loop, poses: Array) -> bool:
+    """True if the map has the nodes of a loop where the loop says they are."""
+    x, y, turn = pose_difference(loop.pose, relative(poses[loop.i], poses[loop.j]))
+    return bool(np.hypot(x, y) < _AWAY and abs(turn) < _TURNED)

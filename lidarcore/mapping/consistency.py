@@ -1,0 +1,72 @@
+"""Which loops support each other: ties that two passes of a place have in common [Mangelson et al., ICRA 2018]."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import UncertainPose, pose_difference, squared_mahalanobis
+from lidarcore.mapping.pose_graph import PoseGraph
+
+# Share of the spread with which a loop was expected, up to which the way around tells whether it is true.
+_TELLING = 0.5
+_HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loop:
+    """T_i_j (3,) with its covariance (3, 3), of an earlier node i and a later node j.
+
+    quality  share of the later submap that lies on the earlier one, less what contradicts it
+    """
+
+    i: int
+    j: int
+    pose: Array
+    covariance: Array
+    quality: float
+
+
+def agree(graph: PoseGraph, a: Loop, b: Loop, gate: float) -> bool:
+    """True if going from a.i by way of a.j to b.j ends where going by way of b.i does, and not just anywhere.
+
+    Where the way around is known little better than the graph expects the loops, any two would fit: a loop within one
+    pass says nothing about a tie to another one.
+    """
+    one = UncertainPose(a.pose, a.covariance).compose(_relative(graph, a.j, b.j))
+    two = _relative(graph, a.i, b.i).compose(UncertainPose(b.pose, b.covariance))
+    around = one.covariance + two.covariance
+    expected = min(spread(_relative(graph, loop.i, loop.j).covariance) for loop in (a, b))
+    return spread(around) < _TELLING * expected and squared(one.pose, two.pose, around) < gate
+
+
+def agreeing(graph: PoseGraph, loop: Loop, others: Sequence[Loop], gate: float) -> list[Loop]:
+    """The loop, and others that all agree with each other, the last ones first."""
+    found = [loop]
+    for other in others[::-1]:
+        if other is not loop and all(agree(graph, other, member, gate) for member in found):
+            found.append(other)
+    return found
+
+
+def support(loops: Sequence[Loop]) -> float:
+    """Sum of the best quality at each node."""
+    best: dict[int, float] = {}
+    for loop in loops:
+        best[loop.j] = max(best.get(loop.j, 0.0), loop.quality)
+    return sum(best.values())
+
+
+def spread(P: Array) -> float:
+    """Standard deviation in m of a place with covariance (3, 3)."""
+    return float(np.sqrt(max(P[0, 0] + P[1, 1], 0.0)))
+
+
+def squared(a: Array, b: Array, P: Array) -> float:
+    """Squared Mahalanobis distance of two poses (3,)."""
+    return float(squared_mahalanobis(pose_difference(a, b), P))
+
+
+def _relative(graph: PoseGraph, i: int, j: int) -> UncertainPose:
+    return _HERE if i == j else graph.relative(i, j)

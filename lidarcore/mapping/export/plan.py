@@ -1,0 +1,68 @@
+"""A floor plan of the walls: SVG for browsers and print, DXF for CAD."""
+
+import io
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.errors import MapFileError
+from lidarcore.mapping.walls import Walls
+
+_MARGIN = 1.0  # m around the plan
+_PIXELS = 1200  # width at which a browser shows it at first
+_BARS = (0.5, 1, 2, 5, 10, 20, 50, 100)  # m, lengths of the scale
+_LAYERS = {"WALLS": 7, "CORNERS": 1, "PATH": 5}  # and their colours in AutoCAD's index
+
+
+def plan_svg(walls: Walls, path: Array) -> str:
+    """Walls, corners and the path (T, 2) m of the sensor in an SVG whose unit is the metre, y up, with a scale."""
+    low, high = _extent(walls, path)
+    width, height = high - low
+    lines = "".join(f'<path d="M{_at(a)}L{_at(b)}"/>' for a, b in walls.ends)
+    corners = "".join(f'<circle cx="{x:.3f}" cy="{y:.3f}" r=".06"/>' for x, y in walls.corners.xy.tolist())
+    way = "L".join(_at(xy) for xy in path)
+    bar = max((length for length in _BARS if length <= width / 4), default=_BARS[0])
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{_PIXELS}" height="{_PIXELS * height / width:.0f}" '
+        f'viewBox="{low[0]:.3f} {-high[1]:.3f} {width:.3f} {height:.3f}">\n<title>Floor plan</title>\n'
+        f'<rect x="{low[0]:.3f}" y="{-high[1]:.3f}" width="{width:.3f}" height="{height:.3f}" fill="#fff"/>\n'
+        f'<g transform="scale(1 -1)" fill="none" stroke-linecap="round">\n'
+        + (f'<path id="path" d="M{way}" stroke="#7ac" stroke-width=".03"/>\n' if way else "")
+        + f'<g id="walls" stroke="#222" stroke-width=".06">{lines}</g>\n'
+        f'<g id="corners" fill="#c30">{corners}</g>\n</g>\n'
+        f'<g id="scale" transform="translate({low[0] + 0.4:.3f} {-low[1] - 0.3:.3f})" stroke="#222">\n'
+        f'<path d="M0-.1V.1M0 0H{bar:g}M{bar:g}-.1V.1" fill="none" stroke-width=".04"/>\n'
+        f'<text x="{bar + 0.2:g}" y=".12" font-size=".4" font-family="sans-serif" stroke="none">{bar:g} m</text>'
+        "\n</g>\n"
+        "</svg>\n"
+    )
+
+
+def plan_dxf(walls: Walls, path: Array) -> str:
+    """The same as a DXF (R2010) in metres, with the layers WALLS, CORNERS and PATH."""
+    import ezdxf  # here: importing it takes a second, and a server that starts needs none
+
+    document = ezdxf.new("R2010", units=ezdxf.units.M)
+    for name, colour in _LAYERS.items():
+        document.layers.add(name, color=colour)
+    space = document.modelspace()
+    for a, b in walls.ends.tolist():
+        space.add_line(a, b, dxfattribs={"layer": "WALLS"})
+    for xy in walls.corners.xy.tolist():
+        space.add_point(xy, dxfattribs={"layer": "CORNERS"})
+    if len(path) > 1:
+        space.add_lwpolyline(path.tolist(), dxfattribs={"layer": "PATH"})
+    text = io.StringIO()
+    document.write(text)
+    return text.getvalue()
+
+
+def _extent(walls: Walls, path: Array) -> tuple[Array, Array]:
+    points = np.concatenate([walls.ends.reshape(-1, 2), path])
+    if not len(points):
+        raise MapFileError("There are no walls and no path: nothing to draw.")
+    return points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
+
+
+def _at(xy: Array) -> str:
+    return f"{xy[0]:.3f} {xy[1]:.3f}"

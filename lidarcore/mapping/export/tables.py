@@ -1,0 +1,72 @@
+"""Walls as CSV and GeoJSON: metres, radians, seconds, and saying so."""
+
+import csv
+import io
+import json
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from lidarcore.mapping.walls import Walls
+
+Row = dict[str, Any]
+
+
+def walls_csv(walls: Walls, chosen: Iterable[int] | None = None) -> str:
+    """A line for each wall, or each chosen one; where it may go on beyond an end, `ended` is 0, `length` the least."""
+    text = io.StringIO()
+    writer = csv.DictWriter(text, [*_row(None, 0)], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_row(walls, i) for i in (range(len(walls)) if chosen is None else chosen))
+    return text.getvalue()
+
+
+def walls_geojson(walls: Walls, chosen: Iterable[int] | None = None) -> str:
+    """Walls as LineStrings and corners as Points in the map's own metres, not degrees; the chosen ones if any are."""
+    kept = dict.fromkeys(range(len(walls)) if chosen is None else chosen)
+    features = [_wall_feature(walls, i) for i in kept]
+    corners = walls.corners
+    features += [
+        _corner_feature(walls, k)
+        for k in range(len(corners))
+        if set(corners.walls[k].tolist()) <= kept.keys()
+    ]
+    head = {"type": "FeatureCollection", "format": "lidarcore walls", "version": 1, "unit": "m"}
+    lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
+    return f'{json.dumps(head)[:-1]}, "features": [\n{lines}\n]}}\n'
+
+
+def _row(walls: Walls | None, i: int) -> Row:
+    """What a file says of a wall; the names alone without walls."""
+    names = (
+        "id", "alpha_rad", "r_m", "x1_m", "y1_m", "x2_m", "y2_m", "length_m", "var_alpha_rad2", "cov_alpha_r_rad_m",
+        "var_r_m2", "var_length_m2", "ended_1", "ended_2", "corner_1", "corner_2", "first_seen_s", "last_seen_s",
+        "count",
+    )  # fmt: skip
+    if walls is None:
+        return dict.fromkeys(names)
+    C = walls.line_covariance[i]
+    numbers = [walls.alpha[i], walls.r[i], *walls.ends[i].ravel(), walls.length[i]]
+    numbers += [C[0, 0], C[0, 1], C[1, 1], walls.length_variance[i]]
+    flags = np.concatenate([walls.ended[i], walls.in_corner[i]]).astype(int).tolist()
+    seen = [float(walls.first_seen[i]), float(walls.last_seen[i]), int(walls.count[i])]
+    return dict(zip(names, [i, *(float(f"{value:.9g}") for value in numbers), *flags, *seen], strict=True))
+
+
+def _wall_feature(walls: Walls, i: int) -> Row:
+    row = _row(walls, i)
+    first, second = (row.pop("x1_m"), row.pop("y1_m")), (row.pop("x2_m"), row.pop("y2_m"))
+    return _feature(f"wall-{row.pop('id')}", "LineString", [list(first), list(second)], row)
+
+
+def _corner_feature(walls: Walls, k: int) -> Row:
+    (v_x, c_xy), (_, v_y) = walls.corners.covariance[k].tolist()
+    properties = {"var_x_m2": v_x, "cov_xy_m2": c_xy, "var_y_m2": v_y}
+    properties["walls"] = [f"wall-{i}" for i in walls.corners.walls[k].tolist()]
+    return _feature(f"corner-{k}", "Point", walls.corners.xy[k].round(9).tolist(), properties)
+
+
+def _feature(name: str, kind: str, coordinates: list[Any], properties: Row) -> Row:
+    geometry = {"type": kind, "coordinates": coordinates}
+    return {"type": "Feature", "id": name, "geometry": geometry, "properties": properties}

@@ -1,0 +1,159 @@
+"""The front end: each scan is laid on the surfaces of the last keyframes, in a local frame that loops never bend."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.errors import MotionError
+from lidarcore.geometry import UncertainPose, compose, relative
+from lidarcore.localization.deskewing import deskew
+from lidarcore.mapping.correlative import search
+from lidarcore.mapping.laying import Laid, information_of, lay
+from lidarcore.mapping.patches import Patches, patches
+from lidarcore.mapping.settings import FrontSettings
+from lidarcore.mapping.surfels import Surfels, surfels
+from lidarcore.scan import Scan
+
+_HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
+_FLOOR = np.diag([0.01, 0.01, 0.005]) ** 2  # what a step is never known better than: the search needs room
+_BLIND = 20  # patches: nothing can be laid on a scan that has fewer
+_SLOW = 0.1  # weight of the last scan in the usual time between two
+_FURTHER = 3.0  # times as far is looked for a scan that does not fit
+_SURE = 0.6  # share of a scan on the map from which on it needs no search
+_WIDE = 0.5  # m by which a point may be off where the search is needed in any case
+_BETTER = 0.02  # share of a scan by which a pose that was searched for must fit better than that of the guess
+_BAD = 0.4  # share of a scan on the map below which it is a keyframe, as it shows what is new
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tracked:
+    """Where a scan was taken, in the local frame.
+
+    stamp     s
+    node      number of the keyframe that the scan hangs on; its own if it is one
+    tie       T_node_scan (3,) with its covariance (3, 3), of the keyframe before if the scan is one itself
+    moved     T_node_scan as far as motion alone tells: odometry, or the going on of the motion
+    on        False if it lies on nothing known: only odometry or the last motion says where it is
+    scan      as a sensor would see it that stood still at its stamp
+    patches   of the scan
+    keyframe  whether the scan is one
+    """
+
+    stamp: float
+    node: int
+    tie: UncertainPose
+    moved: UncertainPose
+    on: bool
+    scan: Scan
+    patches: Patches
+    keyframe: bool
+
+
+class FrontEnd:
+    """Takes scans one by one. Odometry is used where scans have it, else the motion is taken to go on."""
+
+    def __init__(self, settings: FrontSettings) -> None:
+        self._settings = settings
+        self._number = 0
+        self._window: deque[tuple[Patches, Array]] = deque(maxlen=settings.keyframes)
+        self._map: Surfels | None = None
+        self._anchor = np.zeros(3)  # T_local_keyframe
+        self._known = self._moved = _HERE  # T_keyframe_scan, and by motion alone
+        self._before: tuple[float, Array | None] | None = None  # stamp and odometry
+        self._motion, self._period = np.zeros(3), 0.0  # s between scans, as stamps of single scans jitter
+
+    def step(self, scan: Scan) -> Tracked:
+        """Place a scan. Raises MotionError if the clock went back or odometry jumped; nothing has changed then."""
+        if self._before is None:
+            seen = patches(scan, self._settings.match)
+            self._before = scan.stamp, scan.odometry
+            self._begin(seen)
+            return Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, True)
+        dt, driven = self._since(scan)
+        if (
+            scan.odometry is not None
+        ):  # without, the motion found depends on what is taken out, and may run away
+            scan = _deskewed(scan, driven.pose, dt)
+        seen = patches(scan, self._settings.match)
+        guess, moved = self._known.compose(driven), self._moved.compose(driven)
+        laid = self._laid(seen, guess)
+        on = laid.inliers >= self._settings.inliers
+        tie = self._tie(laid) if on else guess
+        self._motion = relative(self._known.pose, tie.pose) if on else np.zeros(3)
+        self._period += _SLOW * (dt - self._period)
+        self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
+        leaves = len(seen.means) >= _BLIND and self._leaves(tie[0], laid.inliers)
+        tracked = Tracked(scan.stamp, self._number - 1, tie, moved, on, scan, seen, leaves)
+        if leaves:
+            self._anchor = compose(self._anchor, tie[0])
+            self._begin(seen)
+        return tracked
+
+    def _begin(self, seen: Patches) -> None:
+        """The scan is a keyframe: the map is made anew."""
+        self._window.append((seen, self._anchor))
+        scans, poses = zip(*self._window, strict=True)
+        match = self._settings.match
+        self._map = surfels(scans, np.array(poses), match.patch, match.reach)
+        self._known = self._moved = _HERE
+        self._number += 1
+
+    def _since(self, scan: Scan) -> tuple[float, UncertainPose]:
+        """Seconds since the last scan, and the motion: by odometry, else as before."""
+        assert self._before is not None
+        s, (stamp, odometry) = self._settings, self._before
+        dt = scan.stamp - stamp
+        if dt < 0:
+            raise MotionError(f"The clock went back by {-dt:g} s: leave the scan out, or begin a new map.")
+        if scan.odometry is None or odometry is None:
+            change = max(dt, self._period) * np.array([s.speed_change, s.speed_change, s.turn_change])
+            return dt, UncertainPose(self._motion, np.diag(change**2) + _FLOOR)
+        motion = relative(odometry, scan.odometry)
+        if (way := float(np.hypot(*motion[:2]))) > s.max_step:
+            raise MotionError(
+                f"Odometry jumped by {way:.3g} m: leave the scan out, or raise max_step from {s.max_step:g} m."
+            )
+        return dt, UncertainPose(motion, s.odometry.covariance(motion) + _FLOOR)
+
+    def _laid(self, seen: Patches, guess: UncertainPose) -> Laid:
+        """The scan on the local map: from the guess on, and after a search where the guess is vague or does not fit."""
+        assert self._map is not None
+        match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        prior = information_of(P)
+        sigma = np.sqrt(np.diagonal(P))
+        far = np.percentile(np.hypot(*seen.means.T), 80) if len(seen.means) else 0.0
+        laid = lay(self._map, seen, x, x, prior, match.reach)
+        if laid.inliers < _SURE or 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE:
+            laid = self._searched(seen, x, sigma, prior, laid)
+        if laid.inliers < _SURE:
+            laid = self._searched(seen, x, _FURTHER * sigma, prior, laid)
+        return laid
+
+    def _searched(self, seen: Patches, x: Array, sigma: Array, prior: Array, laid: Laid) -> Laid:
+        """The better one of where the scan was laid and where a search finds it."""
+        assert self._map is not None
+        match = self._settings.match
+        start = search(self._map.means, seen.means, x, sigma, match)
+        other = lay(self._map, seen, start, x, prior, match.reach)
+        return other if other.inliers > laid.inliers + _BETTER else laid
+
+    def _tie(self, laid: Laid) -> UncertainPose:
+        """The pose seen from the keyframe."""
+        exact = UncertainPose(self._anchor, np.zeros((3, 3)))
+        return exact.relative(UncertainPose(laid.pose, information_of(laid.information)))
+
+    def _leaves(self, pose: Array, inliers: float) -> bool:
+        """True if a scan at this pose from its keyframe is to be one itself."""
+        s = self._settings
+        far = np.hypot(*pose[:2]) >= s.keyframe_distance or abs(pose[2]) >= s.keyframe_turn
+        return bool(far or inliers < _BAD)
+
+
+def _deskewed(scan: Scan, motion: Array, dt: float) -> Scan:
+    """The scan without what a motion (3,) in dt s did to it; as it is if beams have no times."""
+    if dt <= 0 or scan.beam_times is None or not np.isfinite(scan.beam_times).all():
+        return scan
+    v, u, w = motion / dt
+    return deskew(scan, float(v), float(w), float(u))

@@ -1,0 +1,209 @@
+"""Occupancy grids as ROS keeps them: an image, and beside it a YAML file that places it (Nav2 map_server)."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, UnidentifiedImageError
+from pydantic import BaseModel, Field, ValidationError, model_validator
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from lidarcore.arrays import Array
+from lidarcore.errors import GridError, MapFileError
+from lidarcore.files import replacing_all
+from lidarcore.mapping.grid.occupancy import FREE, OCCUPIED, UNKNOWN, Cells, OccupancyGrid
+
+_BLACK, _GREY, _WHITE = 0, 205, 254  # what map_saver writes for occupied, unknown and free cells
+_LONGEST_YAML = 100_000  # bytes
+_MOST_PIXELS = 100_000_000
+_OPAQUE = 255
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+
+
+class _Header(BaseModel):
+    """What the YAML file says. Other entries are left alone."""
+
+    image: Annotated[str, Field(min_length=1)]
+    resolution: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    origin: tuple[Finite, Finite, Finite]
+    negate: bool
+    occupied_thresh: Share
+    free_thresh: Share
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+
+    @model_validator(mode="after")
+    def _check_order(self) -> "_Header":
+        if self.free_thresh >= self.occupied_thresh:
+            raise ValueError("free_thresh must be below occupied_thresh")
+        return self
+
+
+def read_ros_map(path: str | Path) -> OccupancyGrid:
+    """The grid of a YAML file and its image (PGM, PNG, BMP), as Nav2 reads them in the modes trinary, scale and raw.
+
+    With one exception: Nav2 before 2025 wrote unknown cells as grey 205 and a free_thresh of 0.25, by which it reads
+    them as free. A trinary image of only the three shades that map_saver writes is read as it was meant.
+    Raises MapFileError if a file is missing, is none, is damaged or too large, says what makes no sense, or if the
+    YAML points to an image outside of its folder.
+    """
+    path = Path(path)
+    try:
+        header = _read_header(path)
+        shades, opacity = _read_image(_image_beside(path, header.image))
+        cells = _MODES[header.mode](shades, opacity, header)
+        return OccupancyGrid(cells[::-1], header.resolution, np.array(header.origin))
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        raise MapFileError(f"{path.name} cannot be read: {error}") from error
+
+
+def write_ros_map(grid: OccupancyGrid, path: str | Path) -> None:
+    """Write a YAML file and beside it a PGM of the same name, trinary, as Nav2's map_saver does: both, or none.
+
+    Raises MapFileError if the suffix is not .yaml or a file cannot be written.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".yaml":
+        raise MapFileError(f"{path.name} should end in .yaml; the image beside it ends in .pgm.")
+    image = path.with_suffix(".pgm")
+    try:
+        with replacing_all(image, path) as (image_part, yaml_part):
+            write_pgm(grid, image_part)
+            yaml_part.write_text(ros_yaml(grid, image.name), "utf-8")
+    except OSError as error:
+        raise MapFileError(f"{path} cannot be written: {error}.") from error
+
+
+def write_pgm(grid: OccupancyGrid, path: Path) -> None:
+    """Write the image alone. Raises OSError."""
+    height, width = grid.cells.shape
+    path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + shades_of(grid).tobytes())
+
+
+def shades_of(grid: OccupancyGrid) -> NDArray[np.uint8]:
+    """Grey values (H, W) as map_saver writes them, the first row at the top."""
+    shades = np.where(grid.occupied, _BLACK, np.where(grid.free, _WHITE, _GREY))
+    return np.ascontiguousarray(shades.astype(np.uint8)[::-1])
+
+
+def ros_yaml(grid: OccupancyGrid, image: str) -> str:
+    """The YAML text; thresholds between the shades that are written, so that unknown stays unknown."""
+    x, y, yaw = grid.origin.tolist()
+    return (
+        f"image: {image}\nmode: trinary\nresolution: {grid.resolution:.9g}\norigin: [{x:.9g}, {y:.9g}, {yaw:.9g}]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+
+
+def _read_header(path: Path) -> _Header:
+    if path.stat().st_size > _LONGEST_YAML:
+        raise MapFileError(f"{path.name} is too long for the YAML of a map: give the .yaml, not the image.")
+    try:
+        document: Any = YAML(typ="safe", pure=True).load(path.read_text("utf-8"))
+        if not isinstance(document, dict):
+            raise MapFileError(
+                f"{path.name} holds no entries: it should say image, resolution, origin and more."
+            )
+        return _Header.model_validate(document)
+    except ValidationError as error:
+        wrong = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'header'}: {e['msg']}" for e in error.errors())
+        raise MapFileError(f"{path.name} is no map that can be used: {wrong}.") from error
+    except (YAMLError, RecursionError) as error:
+        raise MapFileError(f"{path.name} is no YAML: {error}") from error
+
+
+def _image_beside(path: Path, name: str) -> Path:
+    folder = path.parent.resolve()
+    image = (folder / name).resolve()
+    if not image.is_relative_to(folder):
+        raise MapFileError(
+            f"{path.name} points to {name}, outside of its folder: put the image beside it and name it alone."
+        )
+    return image
+
+
+def _read_image(path: Path) -> tuple[Array, Array]:
+    """Brightness and opacity (H, W) from 0 to 1 of an image, the first row at the top."""
+    try:
+        with Image.open(path, formats=("PPM", "PNG", "BMP")) as image:
+            width, height = image.size
+            if width * height > _MOST_PIXELS:
+                raise GridError(f"{path.name} has {width} x {height} pixels, more than {_MOST_PIXELS}.")
+            full = 65535.0 if image.mode.startswith("I") else 255.0
+            _check_length(path, width, height, full)
+            if full > _OPAQUE:
+                shades = np.asarray(image, np.float64) / full
+                return shades, np.ones_like(shades)
+            pixels = np.asarray(image.convert("RGBA"), np.float64) / full
+            return pixels[..., :3].mean(axis=-1), pixels[..., 3]
+    except UnidentifiedImageError as error:
+        raise MapFileError(f"{path.name} is no PGM, PNG or BMP.") from error
+
+
+def _check_length(path: Path, width: int, height: int, full: float) -> None:
+    """Raise MapFileError if a binary PGM holds less or more than the pixels it announces."""
+    with path.open("rb") as file:
+        head, size = file.read(1000), path.stat().st_size
+    if not head.startswith(b"P5"):
+        return
+    wanted = width * height * (2 if full > _OPAQUE else 1)
+    header = _header_length(head)
+    if size != header + wanted:
+        raise MapFileError(
+            f"{path.name} says {width} x {height} pixels, which take {wanted} bytes, but holds {size - header}."
+        )
+
+
+def _header_length(head: bytes) -> int:
+    """Bytes before the pixels: three numbers, comments among them, and one space after the last."""
+    at, numbers = 2, 0
+    while numbers < 3:
+        while head[at : at + 1].isspace():
+            at += 1
+        comment = head[at : at + 1] == b"#"
+        while at < len(head) and not (head[at : at + 1] == b"\n" if comment else head[at : at + 1].isspace()):
+            at += 1
+        numbers += not comment
+    return at + 1
+
+
+def _trinary(shades: Array, opacity: Array, header: _Header) -> Cells:
+    if (opacity < 1).any():
+        shades = (3 * shades + opacity) / 4  # as Nav2 does
+    cells = _thresholded(_occupancy(shades, header), header)
+    saved = np.isin(np.rint(shades * 255), (_BLACK, _GREY, _WHITE)).all()
+    if saved:
+        cells[np.rint(shades * 255) == _GREY] = UNKNOWN
+    return cells
+
+
+def _scale(shades: Array, opacity: Array, header: _Header) -> Cells:
+    occupancy, low, high = _occupancy(shades, header), header.free_thresh, header.occupied_thresh
+    between = np.rint((occupancy - low) / (high - low) * 100)
+    cells = np.where((occupancy >= low) & (occupancy <= high), between, _thresholded(occupancy, header))
+    return np.where(opacity < 1, UNKNOWN, cells).astype(np.int8)
+
+
+def _raw(shades: Array, opacity: Array, header: _Header) -> Cells:
+    values = np.rint(shades * 255)
+    return np.where(values <= OCCUPIED, values, UNKNOWN).astype(np.int8)
+
+
+def _occupancy(shades: Array, header: _Header) -> Array:
+    return shades if header.negate else 1.0 - shades
+
+
+def _thresholded(occupancy: Array, header: _Header) -> Cells:
+    free, occupied = occupancy < header.free_thresh, occupancy > header.occupied_thresh
+    return np.where(occupied, OCCUPIED, np.where(free, FREE, UNKNOWN)).astype(np.int8)
+
+
+_MODES: dict[str, Callable[[Array, Array, _Header], Cells]] = {
+    "trinary": _trinary,
+    "scale": _scale,
+    "raw": _raw,
+}

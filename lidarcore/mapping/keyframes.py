@@ -1,0 +1,43 @@
+"""Keyframes: the scans that make the map, with what is laid and compared of them."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import act, rotation
+from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.sight import Sight
+from lidarcore.scan import Scan
+
+
+class Keyframe(NamedTuple):
+    """A scan of the map, its patches, and what it saw and looked through."""
+
+    scan: Scan
+    patches: Patches
+    sight: Sight
+
+
+class Keyframes(NamedTuple):
+    """The scans of a map, where they were taken, and how well that is known.
+
+    numbers      (K,) the how-manieth scan each of them was, from 0
+    scans        K scans
+    poses        (K, 3) T_map_scan: x m, y m, heading rad; the first scan is the origin
+    covariances  (K, 3, 3) of the poses, given the first
+    """
+
+    numbers: Array
+    scans: tuple[Scan, ...]
+    poses: Array
+    covariances: Array
+
+
+def joined(scans: Sequence[Patches], poses: Array) -> Patches:
+    """The patches of scans at poses (K, 3), together in the frame of the poses."""
+    means = np.concatenate([act(pose, scan.means) for pose, scan in zip(poses, scans, strict=True)])
+    turned = [scan.normals @ rotation(pose[2]).T for pose, scan in zip(poses, scans, strict=True)]
+    rest = (np.concatenate(columns) for columns in zip(*(scan[2:] for scan in scans), strict=True))
+    return Patches(means, np.concatenate(turned), *rest)

@@ -1,0 +1,126 @@
+"""A scan is laid on a map of surface elements: point to line, robust, with the guess taking part [Censi, ICRA 2008]."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.compiled import kernel
+from lidarcore.geometry.kernels import wrap
+from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.surfels import Surfels, nearest
+
+_SIDE = 0.8  # cosine of the largest angle between two surfaces that can be the same one
+_ROUNDS, _CONVERGED = 25, 1e-4  # m and rad
+_SHRINK, _LEAST = 0.7, 1 / 3  # the reach falls by this factor each round, down to this share
+_CAUCHY = 4.0  # squared standard deviations at which a distance counts half
+_DOUBT = 11.34  # chi-square of three degrees of freedom, 99 %: from here on the guess counts less
+
+
+class Laid(NamedTuple):
+    """How a scan lies on a map.
+
+    pose         (3,) T_map_scan
+    information  (3, 3) of the pose, the guess included
+    inliers      share of the returns that make patches which lie on the map
+    """
+
+    pose: Array
+    information: Array
+    inliers: float
+
+
+def information_of(covariance: Array) -> Array:
+    """Inverse (3, 3) of a covariance."""
+    information: Array = np.linalg.inv(covariance).astype(np.float64)
+    return information
+
+
+def lay(map: Surfels, scan: Patches, start: Array, guess: Array, prior: Array, reach: float) -> Laid:
+    """Gauss-Newton from a start (3,); the guess (3,) takes part with its information prior (3, 3).
+
+    Where the match disagrees with the guess by more than chance allows (wheels that slip), the guess counts less;
+    where the surfaces say nothing (along a corridor), it counts fully.
+    """
+    x, H = np.array(start), np.empty((3, 3))
+    inliers = _lay(map, scan, x, guess, prior, reach, H)
+    x[2] = wrap(x[2])
+    return Laid(x, H, inliers)
+
+
+@kernel
+def _lay(map: Surfels, scan: Patches, x: Array, guess: Array, prior: Array, reach: float, H: Array) -> float:
+    g, B, least, share = np.empty(3), np.empty((3, 3)), _LEAST * reach, 0.0
+    for _ in range(_ROUNDS):
+        share = linearised(map, scan, x, reach, H, B, g)
+        _without_pretence(H, B, g)
+        off = guess - x
+        off[2] = wrap(off[2])
+        trust = min(1.0, 2 / (1 + float(off @ prior @ off) / _DOUBT))
+        weight = trust * trust
+        H += weight * prior
+        step = np.linalg.solve(H, weight * (prior @ off) - g)
+        x += step
+        if reach == least and np.abs(step).max() < _CONVERGED:
+            break
+        reach = max(_SHRINK * reach, least)
+    return share
+
+
+@kernel
+def linearised(map: Surfels, scan: Patches, x: Array, reach: float, H: Array, B: Array, g: Array) -> float:
+    """Information H (3, 3) and gradient g (3,) of the distances at a pose x (3,); returns the share of inliers.
+
+    B (3, 3) is the part of H that is nothing but errors of the normals: n n^T is too large by var(n) t t^T.
+    """
+    H[:], B[:], g[:] = 0.0, 0.0, 0.0
+    c, s = np.cos(x[2]), np.sin(x[2])
+    on, all_of_them = 0.0, 0.0
+    for i in range(len(scan.means)):
+        dx, dy = c * scan.means[i, 0] - s * scan.means[i, 1], s * scan.means[i, 0] + c * scan.means[i, 1]
+        mx, my = (
+            c * scan.normals[i, 0] - s * scan.normals[i, 1],
+            s * scan.normals[i, 0] + c * scan.normals[i, 1],
+        )
+        all_of_them += scan.counts[i]
+        k = nearest(map, x[0] + dx, x[1] + dy, mx, my, reach, _SIDE)
+        if k < 0:
+            continue
+        on += scan.counts[i]
+        nx, ny = map.normals[k]
+        r = nx * (x[0] + dx - map.means[k, 0]) + ny * (x[1] + dy - map.means[k, 1])
+        w = 1 / (scan.variances[i] + map.variances[k] + r * r / _CAUCHY)
+        jt, bt = ny * dx - nx * dy, -nx * dx - ny * dy
+        _add(H, g, nx, ny, jt, w, r)
+        _add(B, g, -ny, nx, -bt, w * map.tilts[k], 0.0)
+    return on / max(all_of_them, 1.0)
+
+
+@kernel
+def _add(H: Array, g: Array, a: float, b: float, c: float, w: float, r: float) -> None:
+    H[0, 0] += w * a * a
+    H[0, 1] += w * a * b
+    H[0, 2] += w * a * c
+    H[1, 1] += w * b * b
+    H[1, 2] += w * b * c
+    H[2, 2] += w * c * c
+    H[1, 0], H[2, 0], H[2, 1] = H[0, 1], H[0, 2], H[1, 2]
+    g[0] += w * a * r
+    g[1] += w * b * r
+    g[2] += w * c * r
+
+
+@kernel
+def _without_pretence(H: Array, B: Array, g: Array) -> None:
+    """Directions in which H is mostly pretended count less, down to nothing; twice B, as it scatters by as much."""
+    scale = np.sqrt(H[0, 0] + H[1, 1] + 1e-12), np.sqrt(H[2, 2] + 1e-12)
+    D = np.diag(np.array([1 / scale[0], 1 / scale[0], 1 / scale[1]]))
+    values, V = np.linalg.eigh(D @ H @ D)
+    pretended = V.T @ (D @ B @ D) @ V
+    a, d = V.T @ (D @ g), np.diag(1 / np.diag(D))
+    for m in range(3):
+        true = max(0.0, 1 - 2 * pretended[m, m] / max(values[m], 1e-12))
+        values[m] *= true
+        a[m] *= true
+    H[:] = d @ (V * values) @ V.T @ d
+    g[:] = d @ (V @ a)

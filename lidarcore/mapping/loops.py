@@ -1,0 +1,199 @@
+"""Loops: which earlier places a new one is laid on, and which of these ties are believed.
+
+What the last keyframes saw together is laid on what those of an earlier pass saw together. A tie must lie in the
+chi-square gate of what the graph expects. Where the graph is too vague for that to exclude a wrong one, it waits until
+others along a stretch of the way agree with it [Olson, ICRA 2009; Mangelson et al., ICRA 2018], and is believed only if
+no rival that says something else has nearly as many that agree.
+"""
+
+import numpy as np
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import chi_square_gate, relative
+from lidarcore.mapping.consistency import Loop, agree, agreeing, spread, squared, support
+from lidarcore.mapping.correlative import search
+from lidarcore.mapping.keyframes import Keyframe, joined
+from lidarcore.mapping.laying import Laid, information_of, lay
+from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.pose_graph import PoseGraph
+from lidarcore.mapping.settings import LoopSettings, MatchSettings
+from lidarcore.mapping.sight import agreement
+from lidarcore.mapping.surfels import Surfels, surfels
+
+_MARGIN = 0.3  # m by which surfaces may seem to be off where an overlap is guessed
+_CONFLICT = 0.2  # m by which a point must lie before a surface to contradict it
+# A relative pose known this well (m, m, rad) gains nothing from a loop.
+_KNOWN = np.array([0.04, 0.04, 0.015])
+# A single wrong loop makes the graph surer than it should be: loops are looked for as if it were less sure.
+_CAUTION = 4.0
+_WIDEN = (
+    9.0  # the guess takes part with this many times its covariance, lest it is counted twice in the graph
+)
+# A guess from the graph is never taken to be better than this: the search needs room.
+_FLOOR = np.diag([0.05, 0.05, 0.02]) ** 2
+_ALONE = 0.2  # of the support of the last loops, which all that contradict them may have together
+_RIVAL = 0.85  # of a match's quality, from which on another place is a rival
+
+
+class LoopFinder:
+    """Ties nodes of a graph to earlier ones."""
+
+    def __init__(
+        self, graph: PoseGraph, keyframes: list[Keyframe], loops: LoopSettings, match: MatchSettings
+    ) -> None:
+        self._graph, self._keyframes, self._settings, self._match_settings = graph, keyframes, loops, match
+        self._waiting: list[Loop] = []
+        self._gate = float(chi_square_gate(loops.gate, 3))
+
+    def find(self, k: int) -> list[Loop]:
+        """Loops to believe after node k came in; some of them may be of the nodes just before it."""
+        believed = []
+        places = self._places(k)
+        seen = self._submap(k, range(max(0, k - self._settings.before), k + 1)) if places else None
+        for i, P in places:
+            assert seen is not None
+            for loop in self._hypotheses(i, k, P, seen):
+                if 3 * spread(P) < self._match_settings.reach:
+                    believed.append(loop)
+                else:
+                    self._waiting.append(loop)
+        if self._waiting and self._waiting[-1].j == k:
+            believed += self._agreeing(k)
+        return believed
+
+    def conclude(self) -> list[Loop]:
+        """Loops to believe of the last nodes, which no further ones will support: all fit, and nothing else does.
+
+        The newest scans alone are laid on each earlier pass, within all of what the graph leaves open.
+        """
+        way, found = self._way(), []
+        for k in range(max(1, len(way) - 2 * self._settings.apart), len(way)):
+            if way[-1] - way[k] > self._settings.shortest:
+                continue
+            seen = self._submap(k, range(k - 1, k + 1))
+            for i, P in self._places(k):
+                if 3 * spread(P) < self._match_settings.max_shift:
+                    found += self._hypotheses(i, k, P, seen)
+        self._waiting = found
+        best = max((self._agreeing_with(loop) for loop in found), key=support, default=[])
+        rivals = [loop for loop in found if not any(loop is member for member in best)]
+        alone = sum(loop.quality for loop in rivals) <= _ALONE * sum(loop.quality for loop in best)
+        self._waiting = []
+        return best if alone and len({loop.j for loop in best}) > 1 else []
+
+    def _places(self, k: int) -> list[tuple[int, Array]]:
+        """Earlier nodes worth a match, with the covariance of k seen from there: the best of each pass nearby."""
+        settings, poses = self._settings, self._graph.poses
+        distances = np.hypot(*(poses[: max(k - settings.apart, 0), :2] - poses[k, :2]).T)
+        candidates = np.flatnonzero(distances < settings.farthest)
+        found = []
+        for run in _runs(candidates):
+            closest = int(run[np.argmin(distances[run])])
+            P = self._graph.relative(closest, k)[1]
+            radius = settings.distance + settings.sigmas * spread(P)
+            if distances[closest] > min(radius, settings.farthest) or (np.diagonal(P) < _KNOWN**2).all():
+                continue
+            near = run[distances[run] < min(radius, settings.farthest)]
+            best = self._best(near, k, P)
+            if best is not None:
+                found.append((float(np.linalg.det(P)), best, P))
+        found.sort(key=lambda place: -place[0])
+        return [(i, P) for _, i, P in found[: settings.places]]
+
+    def _best(self, run: Ints, k: int, P: Array) -> int | None:
+        """The node of a run that saw most of what node k sees; None if that is too little."""
+        poses, margin = self._graph.poses, _MARGIN + 2 * spread(P)
+        few = run[:: max(1, len(run) // 12)]
+        shares = [
+            agreement(
+                self._keyframes[i].sight, self._keyframes[k].sight, relative(poses[i], poses[k]), margin
+            )[0]
+            for i in few
+        ]
+        return int(few[np.argmax(shares)]) if max(shares) >= self._settings.overlap else None
+
+    def _submap(self, around: int, nodes: range) -> Patches:
+        """What nodes saw together, seen from one of them."""
+        poses = relative(self._graph.poses[around], self._graph.poses[nodes.start : nodes.stop])
+        return joined([self._keyframes[n].patches for n in nodes], poses)
+
+    def _hypotheses(self, i: int, k: int, P: Array, seen: Patches) -> list[Loop]:
+        """Where node k may be, seen from around node i: the best place, and its rival if that is nearly as good."""
+        half = self._settings.before
+        nodes = range(max(0, i - half), min(i + half + 1, k - self._settings.apart))
+        match = self._match_settings
+        earlier = self._submap(i, nodes)
+        reference = surfels([earlier], np.zeros((1, 3)), match.patch, match.reach)
+        mean = relative(self._graph.poses[i], self._graph.poses[k])
+        first = self._laid(i, k, mean, P, reference, seen, np.empty((0, 3)))
+        if first is None:
+            return []
+        if 3 * spread(P) < match.reach:
+            return [first]
+        second = self._laid(i, k, mean, P, reference, seen, first.pose[None])
+        if second is None or second.quality < _RIVAL * first.quality or self._same(first, second):
+            return [first]
+        return [first, second]
+
+    def _same(self, a: Loop, b: Loop) -> bool:
+        """True if two poses are one, known only vaguely (along a corridor)."""
+        return squared(a.pose, b.pose, a.covariance + b.covariance) < self._gate
+
+    def _laid(
+        self, i: int, k: int, mean: Array, P: Array, reference: Surfels, seen: Patches, besides: Array
+    ) -> Loop | None:
+        """The best place besides others; None if it does not fit, or not what the graph expects."""
+        P = _CAUTION * P + _FLOOR
+        prior, match = information_of(_WIDEN * P), self._match_settings
+        start = search(reference.means, seen.means, mean, np.sqrt(np.diagonal(P)), match, besides)
+        laid: Laid = lay(reference, seen, start, mean, prior, match.reach)
+        if laid.inliers < self._settings.inliers:
+            return None
+        conflicts = self._conflicts(i, k, laid.pose)
+        C = information_of(laid.information) + self._settings.floor
+        if conflicts > self._settings.conflicts or squared(laid.pose, mean, C + P) > self._gate:
+            return None
+        return Loop(i, k, laid.pose, C, laid.inliers - conflicts)
+
+    def _conflicts(self, i: int, k: int, pose: Array) -> float:
+        """Largest share of either scan that lies where the other one looked through."""
+        a, b = self._keyframes[i].sight, self._keyframes[k].sight
+        there, back = (
+            agreement(a, b, pose, _CONFLICT),
+            agreement(b, a, relative(pose, np.zeros(3)), _CONFLICT),
+        )
+        return max(there[1], back[1])
+
+    def _agreeing(self, k: int) -> list[Loop]:
+        """The waiting loops that fit each other, if they reach far enough and no rivals do; they wait no more."""
+        way = self._way()
+        self._waiting = [loop for loop in self._waiting if way[k] - way[loop.j] < self._settings.memory]
+        new = [loop for loop in self._waiting if loop.j == k]
+        sets = [self._agreeing_with(loop) for loop in new]
+        best = max(sets, key=support)
+        P = self._graph.relative(best[0].i, k)[1]
+        stretch = np.clip(self._settings.sigmas * spread(P), *self._settings.stretch)
+        nodes = {loop.j for loop in best}
+        if len(nodes) < self._settings.support or way[max(nodes)] - way[min(nodes)] < stretch:
+            return []
+        members = {id(loop) for loop in best}
+        others = [loop for loop in self._waiting if id(loop) not in members and loop.j in nodes]
+        against = [loop for loop in others if not any(agree(self._graph, loop, b, self._gate) for b in best)]
+        rivals = [self._agreeing_with(loop) for loop in against]
+        if rivals and support(max(rivals, key=support)) > self._settings.rivals * support(best):
+            return []
+        self._waiting = [loop for loop in self._waiting if id(loop) not in members]
+        return best
+
+    def _agreeing_with(self, loop: Loop) -> list[Loop]:
+        return agreeing(self._graph, loop, self._waiting, self._gate)
+
+    def _way(self) -> Array:
+        """Metres travelled to each node."""
+        steps = np.diff(self._graph.poses[:, :2], axis=0)
+        return np.concatenate([[0.0], np.cumsum(np.hypot(*steps.T))])
+
+
+def _runs(nodes: Ints) -> list[Ints]:
+    """Successive numbers together, with small gaps."""
+    return [run for run in np.split(nodes, np.flatnonzero(np.diff(nodes) > 3) + 1) if len(run)]

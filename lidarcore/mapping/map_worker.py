@@ -1,0 +1,123 @@
+"""The back of the live map, in a thread of its own: loops, grid and walls, none of which a scan waits for."""
+
+import logging
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.errors import GridError
+from lidarcore.mapping.back import BackEnd
+from lidarcore.mapping.front import Tracked
+from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
+from lidarcore.mapping.settings import MapperSettings
+from lidarcore.mapping.walls import Walls, find_walls
+from lidarcore.mapping.worker import Worker
+from lidarcore.settings import ExtractionSettings
+
+_log = logging.getLogger(__name__)
+
+_EVERY = 1.0  # s between two pictures of the map, at least
+_REST = 10.0  # times as long as the walls took to find, they are not sought again
+_MOST_CELLS = 16_000_000  # of the grid; a larger building gets larger cells
+_END_WITHIN = 5.0  # s that the thread may take for what it is at
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Corrected:
+    """Poses (K, 3), T_map_keyframe, of the first K keyframes, and the covariance (3, 3) of the last of them."""
+
+    poses: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapPicture:
+    """What is known of the building: which cells are occupied and free, and the walls, none before the first search."""
+
+    grid: OccupancyGrid
+    walls: Walls | None
+
+
+class MapWorker:
+    """Takes keyframes; `corrected` and `picture` are replaced whole, and may be read from any thread."""
+
+    def __init__(self, settings: MapperSettings, extraction: ExtractionSettings) -> None:
+        self.corrected = Corrected(np.zeros((1, 3)), np.zeros((3, 3)))
+        self.picture: MapPicture | None = None
+        self._extraction = extraction
+        self._back = BackEnd(settings)
+        self._builder, self._drawn = GridBuilder(GridSettings(most_cells=_MOST_CELLS)), 0
+        self._next_picture = self._next_walls = 0.0
+        self._failing = False
+        self._worker: Worker[Tracked] = Worker(self._work, "map", idle=_EVERY)
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether keyframes wait."""
+        return self._worker.is_behind
+
+    def put(self, tracked: Tracked) -> None:
+        """Add a keyframe; returns at once."""
+        self._worker.put(tracked)
+
+    def end(self) -> None:
+        """Take no more keyframes; returns at once."""
+        self._worker.end()
+
+    def close(self) -> None:
+        """End, and wait for it."""
+        self._worker.close(_END_WITHIN)
+
+    def _work(self, tracked: Tracked | None, _: int) -> None:
+        try:
+            self._step(tracked)
+            self._failing = False
+        except Exception:  # one bad keyframe ends nothing, and a thousand do not fill the log
+            if not self._failing:
+                _log.exception("the map could not be brought up to date")
+            self._failing = True
+
+    def _step(self, tracked: Tracked | None) -> None:
+        if tracked is not None:
+            self._add(tracked)
+        if self._drawn < len(self._back.keyframes) and time.monotonic() >= self._next_picture:
+            self._draw()
+
+    def _add(self, tracked: Tracked) -> None:
+        loops = len(self._back.loops)
+        self._back.add(tracked)
+        graph = self._back.graph
+        self.corrected = Corrected(graph.poses, graph.covariance(len(graph) - 1))
+        if len(self._back.loops) > loops:
+            self._builder.clear()
+            self._drawn = 0
+
+    def _draw(self) -> None:
+        self._next_picture = time.monotonic() + _EVERY
+        try:
+            self._bring_up_to_date()
+        except GridError:  # too large for such cells
+            finer = self._builder.settings
+            self._builder, self._drawn = GridBuilder(replace(finer, resolution=2 * finer.resolution)), 0
+            self._bring_up_to_date()
+        grid = self._builder.grid()
+        self.picture = MapPicture(grid, self.picture.walls if self.picture else None)
+        begin = time.monotonic()
+        if begin >= self._next_walls:
+            self.picture = MapPicture(grid, self._walls(grid))
+            end = time.monotonic()
+            self._next_walls = end + _REST * (end - begin)
+
+    def _bring_up_to_date(self) -> None:
+        """Add to the grid the keyframes that it lacks."""
+        poses = self._back.graph.poses
+        for keyframe, pose in zip(self._back.keyframes[self._drawn :], poses[self._drawn :], strict=False):
+            self._builder.add(keyframe.scan, pose)
+            self._drawn += 1
+
+    def _walls(self, grid: OccupancyGrid) -> Walls:
+        graph, scans = self._back.graph, [keyframe.scan for keyframe in self._back.keyframes]
+        covariances = np.array([graph.covariance(k) for k in range(len(scans))])
+        return find_walls(scans, graph.poses, covariances, grid, extraction=self._extraction)

@@ -1,0 +1,128 @@
+"""Distances and angles between walls and corners of a map, with their standard deviations.
+
+What two of them have in common, such as the drift of the keyframes that saw both, does not count twice.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.sparse import csr_array, vstack
+
+from lidarcore.arrays import Array
+from lidarcore.errors import MeasureError
+from lidarcore.mapping.walls import Walls
+
+Kind = Literal["wall", "corner"]
+_Function = Callable[[Array, Array], float]
+
+_STEP = 1e-6  # m, of numeric derivatives by the coordinates of points
+
+
+@dataclass(frozen=True, slots=True)
+class Feature:
+    """A wall or a corner by its number."""
+
+    kind: Kind
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A distance (m) or an angle (rad) and its standard deviation."""
+
+    value: float
+    sigma: float
+
+
+def feature(name: str) -> Feature:
+    """The feature of a name such as wall-3 or corner-12, as the files of a map have them. Raises MeasureError."""
+    kind, _, number = name.partition("-")
+    if kind == "wall" and number.isdecimal():
+        return Feature("wall", int(number))
+    if kind == "corner" and number.isdecimal():
+        return Feature("corner", int(number))
+    raise MeasureError(f"{name!r} is no feature: give wall-N or corner-N.")
+
+
+def distance(walls: Walls, first: Feature, second: Feature) -> Measurement:
+    """Between corners: straight. From a corner to a wall: across its line. Between walls: across, on the average.
+
+    The distance of two walls is that of the middle of each from the line of the other, the mean of both: for
+    parallel walls the clear width. Raises MeasureError if there is no such feature.
+    """
+    return _measured(walls, first, second, distance_of)
+
+
+def angle(walls: Walls, first: Feature, second: Feature) -> Measurement:
+    """Between the lines of two walls, from 0 to pi/2. Raises MeasureError if one of them is a corner or unknown."""
+    if first.kind != "wall" or second.kind != "wall":
+        raise MeasureError("Only walls have directions: give two walls for an angle.")
+    return _measured(walls, first, second, angle_of)
+
+
+def length(walls: Walls, index: int) -> Measurement:
+    """Of a wall, from end to end; a lower bound where it may go on. Raises MeasureError."""
+    _check(walls, Feature("wall", index))
+    return Measurement(float(walls.length[index]), float(np.sqrt(walls.length_variance[index])))
+
+
+def _measured(walls: Walls, first: Feature, second: Feature, f: _Function) -> Measurement:
+    for one in (first, second):
+        _check(walls, one)
+    if first == second:
+        raise MeasureError("Both features are the same: give two.")
+    points = np.concatenate([_points(walls, one) for one in (first, second)])
+    split = len(_points(walls, first))
+    rows = csr_array(vstack([_rows(walls, one) for one in (first, second)]))
+    covariance: Array = walls.model.covariance(rows)
+    value = f(points[:split], points[split:])
+    J = np.empty(points.size)
+    for k in range(points.size):
+        moved = points.copy()
+        moved.flat[k] += _STEP
+        ahead = f(moved[:split], moved[split:])
+        moved.flat[k] -= 2 * _STEP
+        J[k] = (ahead - f(moved[:split], moved[split:])) / (2 * _STEP)
+    return Measurement(abs(value), float(np.sqrt(max(float(J @ covariance @ J), 0.0))))
+
+
+def _check(walls: Walls, one: Feature) -> None:
+    count = len(walls) if one.kind == "wall" else len(walls.corners)
+    if not 0 <= one.index < count:
+        raise MeasureError(f"There is no {one.kind}-{one.index}: the map has {count} of them.")
+
+
+def _points(walls: Walls, one: Feature) -> Array:
+    """Both ends of a wall, or the corner itself: (2, 2) or (1, 2) m."""
+    points: Array = walls.ends[one.index] if one.kind == "wall" else walls.corners.xy[one.index][None]
+    return points
+
+
+def _rows(walls: Walls, one: Feature) -> csr_array:
+    return walls.model.ends_of(one.index) if one.kind == "wall" else walls.corners.rows_of(one.index)
+
+
+def _across(point: Array, wall: Array) -> float:
+    """Signed distance (m) of a point from the line through both ends of a wall."""
+    (dx, dy), (px, py) = wall[1] - wall[0], point - wall[0]
+    return float((dx * py - dy * px) / np.hypot(dx, dy))
+
+
+def distance_of(a: Array, b: Array) -> float:
+    """Of corners (1, 2) or walls (2, 2), m, with a sign where a corner is on one side of a wall."""
+    if len(a) == len(b) == 1:
+        return float(np.hypot(*(a[0] - b[0])))
+    if len(a) == 1 or len(b) == 1:
+        point, wall = (a[0], b) if len(a) == 1 else (b[0], a)
+        return _across(point, wall)
+    there, back = _across(a.mean(axis=0), b), _across(b.mean(axis=0), a)
+    return (abs(there) + abs(back)) / 2
+
+
+def angle_of(a: Array, b: Array) -> float:
+    """Between two walls (2, 2), from 0 to pi/2."""
+    (ax, ay), (bx, by) = a[1] - a[0], b[1] - b[0]
+    turn = np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
+    return float(np.pi / 2 - abs(abs(turn) - np.pi / 2))

@@ -1,0 +1,144 @@
+"""A scan as patches: short pieces of its surfaces, each with a normal and with how well it is known across."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.compiled import kernel
+from lidarcore.mapping.settings import MatchSettings
+from lidarcore.scan import Scan
+
+_LEAST = 3  # points that make a line
+_BEAMS = 2.2  # a line reaches at least this many beams' spacing to either side
+
+
+class Patches(NamedTuple):
+    """N pieces of surface in the order of their bearings, sensor frame.
+
+    means      (N, 2) m
+    normals    (N, 2) towards the sensor
+    variances  (N,) m² of a mean along its normal: noise, or scatter where that is more, and unevenness
+    tilts      (N,) rad² variance of the normal's direction
+    counts     (N,) returns that make it
+    """
+
+    means: Array
+    normals: Array
+    variances: Array
+    tilts: Array
+    counts: Array
+
+
+def patches(scan: Scan, settings: MatchSettings) -> Patches:
+    """The patches of a scan; none where fewer than three neighbouring returns make a line."""
+    bearings = (scan.bearings[scan.valid] + np.pi) % (2 * np.pi) - np.pi
+    order = np.argsort(bearings, kind="stable")
+    bearings, ranges = bearings[order], scan.ranges[scan.valid][order]
+    if len(bearings) < _LEAST:
+        return Patches(np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0))
+    points = ranges[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], -1)
+    spacing = float(np.median(np.diff(bearings)))
+    reaches = np.clip(_BEAMS * spacing * ranges, settings.radius, 4 * settings.radius)
+    noise = np.array([settings.noise.sigma_range, settings.noise.sigma_bearing]) ** 2
+    lines = np.empty((len(points), 5))
+    _fit_lines(points, ranges, reaches, settings.gap, noise, lines)
+    table = np.empty((len(points), 7))
+    number = _gather(points, lines, settings.patch, settings.gap, table)
+    rows = table[:number]
+    variances = rows[:, 4] + settings.unevenness**2
+    return Patches(rows[:, :2].copy(), rows[:, 2:4].copy(), variances, rows[:, 5].copy(), rows[:, 6].copy())
+
+
+@kernel
+def _fit_lines(points: Array, ranges: Array, reaches: Array, gap: float, noise: Array, lines: Array) -> None:
+    """Normal, variance of the point along it, and of the normal's direction; number of points (N, 5)."""
+    N = len(points)
+    for i in range(N):
+        px, py = points[i]
+        first, count = _neighbours(points, i, reaches[i] * reaches[i], max(gap, reaches[i]) ** 2)
+        x = y = xx = xy = yy = 0.0
+        for j in range(count):
+            k = first + j if first + j < N else first + j - N
+            u, v = points[k, 0] - px, points[k, 1] - py
+            x += u
+            y += v
+            xx += u * u
+            xy += u * v
+            yy += v * v
+        x, y = x / count, y / count
+        xx, xy, yy = xx / count - x * x, xy / count - x * y, yy / count - y * y
+        half, root = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+        direction = np.arctan2(2 * xy, xx - yy) / 2
+        nx, ny = -np.sin(direction), np.cos(direction)
+        if nx * px + ny * py > 0:
+            nx, ny = -nx, -ny
+        across = (nx * px + ny * py) / ranges[i]
+        variance = noise[0] * across**2 + noise[1] * ranges[i] ** 2 * (1 - across**2)
+        variance = max(variance, max(half - root, 0.0) * count / max(count - 2, 1))
+        lines[i, 0], lines[i, 1], lines[i, 2] = nx, ny, variance
+        lines[i, 3] = variance / max(count * (half + root), 1e-9)
+        lines[i, 4] = count
+
+
+@kernel
+def _neighbours(points: Array, i: int, reach: float, gap: float) -> tuple[int, int]:
+    """First point and number of points of the run around point i, by squared distances; around the ring."""
+    N = len(points)
+    first, count = i, 1
+    for way in (-1, 1):
+        k, x, y = i, points[i, 0], points[i, 1]
+        while count < N:
+            k += way
+            if k < 0:
+                k = N - 1
+            elif k == N:
+                k = 0
+            u, v = points[k, 0], points[k, 1]
+            if (u - x) ** 2 + (v - y) ** 2 > gap:
+                break
+            if (u - points[i, 0]) ** 2 + (v - points[i, 1]) ** 2 > reach:
+                break
+            x, y = u, v
+            count += 1
+            if way < 0:
+                first = k
+    return first, count
+
+
+@kernel
+def _gather(points: Array, lines: Array, size: float, gap: float, table: Array) -> int:
+    """Neighbouring points up to `size` m apart that lie on one line, together; returns the number of rows."""
+    number, n = 0, 0
+    sx = sy = 0.0
+    for i in range(len(points)):
+        if lines[i, 4] < _LEAST:
+            continue
+        if n > 0:
+            far = (points[i, 0] - sx) ** 2 + (points[i, 1] - sy) ** 2 > size * size
+            bent = table[number, 2] * lines[i, 0] + table[number, 3] * lines[i, 1] < 0.9 * n
+            if far or bent:
+                _close(table[number], n)
+                number, n = number + 1, 0
+        if n == 0:
+            sx, sy = points[i]
+            table[number] = 0.0
+        table[number, 0] += points[i, 0]
+        table[number, 1] += points[i, 1]
+        table[number, 2] += lines[i, 0]
+        table[number, 3] += lines[i, 1]
+        table[number, 4] += lines[i, 2]
+        table[number, 5] += lines[i, 3]
+        n += 1
+    if n > 0:
+        _close(table[number], n)
+        number += 1
+    return number
+
+
+@kernel
+def _close(row: Array, n: int) -> None:
+    """Sums into means; the variance of the mean falls with the number of points, that of the tilt does not."""
+    norm = np.hypot(row[2], row[3])
+    row[0], row[1], row[2], row[3] = row[0] / n, row[1] / n, row[2] / norm, row[3] / norm
+    row[4], row[5], row[6] = row[4] / n / n, row[5] / n, n

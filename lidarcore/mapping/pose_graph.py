@@ -1,0 +1,176 @@
+"""A pose graph: poses tied by relative poses with covariances, in information form [Lu & Milios 1997].
+
+The information of all poses is sparse, with one block for each edge [Eustice et al. 2006]. Gauss-Newton solves it with
+a sparse factor [Kümmerle et al. 2011], and the covariances that are asked for come from the same factor. Edges that
+may be wrong are scaled down by how much they disagree [Agarwal et al. 2013], new ones step by step [Yang et al. 2020].
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array, csc_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import SuperLU, splu
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.errors import LocalizationError
+from lidarcore.geometry import UncertainPose, as_pose_covariance, relative, relative_jacobians, wrap
+from lidarcore.localization.ekf.estimate import as_pose
+from lidarcore.mapping.edges import edge_errors, linearise
+
+_DOUBTFUL = 11.34  # chi-square of three degrees of freedom, 99 %: from here on a doubted edge counts less
+_COOLING = 4.0  # by which doubts about new edges set in earlier from round to round
+_FIXED = 1e12  # information of the first pose
+
+
+class PoseGraph:
+    """Poses T_world_node of nodes 0, 1, ..., the first of which is fixed."""
+
+    def __init__(self, first: ArrayLike = (0.0, 0.0, 0.0)) -> None:
+        self._poses = as_pose(first, "The first pose")[None]
+        self._ends = np.empty((0, 2), np.int64)
+        self._relatives = np.empty((0, 3))
+        self._informations = np.empty((0, 3, 3))
+        self._doubts = np.empty(0)
+        self._settled = 0  # number of edges that took part in the last optimization
+        self._recovery: _Recovery | None = None
+
+    def __len__(self) -> int:
+        return len(self._poses)
+
+    @property
+    def poses(self) -> Array:
+        """(N, 3) m, m, rad."""
+        return self._poses.copy()
+
+    @property
+    def edges(self) -> Ints:
+        """(E, 2) from and to."""
+        return self._ends.copy()
+
+    @property
+    def chi_square(self) -> Array:
+        """(E,) squared Mahalanobis distance of each edge from the poses: three degrees of freedom each."""
+        return edge_errors(self._poses, self._ends, self._relatives, self._informations)
+
+    def add(self, pose: ArrayLike) -> int:
+        """Append a node at a pose (3,), T_world_node as far as is known. Returns its number."""
+        self._poses = np.concatenate([self._poses, as_pose(pose, "The pose")[None]])
+        self._recovery = None
+        return len(self) - 1
+
+    def move(self, poses: Array) -> None:
+        """Put the nodes at poses (N, 3), where something that knows more than the edges has them."""
+        self._poses = np.array(poses, np.float64)
+        self._recovery = None
+
+    def connect(
+        self, i: int, j: int, relative: ArrayLike, covariance: ArrayLike, doubted: bool = False
+    ) -> None:
+        """Tie node j to node i by T_i_j (3,) with its covariance (3, 3); a doubted edge loses weight if it disagrees.
+
+        Raises LocalizationError if a node is unknown or the pose not finite, CovarianceError if the covariance is not
+        positive definite.
+        """
+        if i == j or not (0 <= i < len(self) and 0 <= j < len(self)):
+            raise LocalizationError(f"There is no edge from node {i} to {j} in a graph of {len(self)} nodes.")
+        z = as_pose(relative, "The relative pose")
+        information = np.linalg.inv(as_pose_covariance(covariance, "The covariance of the relative pose"))
+        self._ends = np.concatenate([self._ends, [[i, j]]])
+        self._relatives = np.concatenate([self._relatives, z[None]])
+        self._informations = np.concatenate([self._informations, information[None]])
+        self._doubts = np.append(self._doubts, _DOUBTFUL if doubted else np.inf)
+        self._recovery = None
+
+    def optimize(self, tolerance: float = 1e-6, rounds: int = 50) -> float:
+        """Move the nodes to the most likely poses.
+
+        Gauss-Newton until no pose moves by more than the tolerance (m, rad). Returns chi-square of all edges,
+        doubted ones as far as they count.
+        Raises LocalizationError if a node is not connected to node 0; the poses are untouched then.
+        """
+        self._check_connected()
+        poses, heat, chi2 = self._poses.copy(), self._heat(), 0.0
+        for _ in range(rounds):
+            H, b, chi2 = self._linearised(poses, heat)
+            factor = _factor(H)
+            step = factor.solve(-b).reshape(-1, 3)
+            poses[1:] += step[1:]
+            poses[:, 2] = wrap(poses[:, 2])
+            if heat == 1 and np.abs(step).max() < tolerance:
+                break
+            heat = max(1.0, heat / _COOLING)
+        self._poses, self._recovery, self._settled = poses, _Recovery(factor), len(self._ends)
+        return chi2
+
+    def covariance(self, i: int) -> Array:
+        """Covariance (3, 3) of the pose of node i, given node 0."""
+        return _symmetric(self._recovered.block(i, i))
+
+    def relative(self, i: int, j: int) -> UncertainPose:
+        """T_i_j (3,) as the graph has it now, and its covariance (3, 3)."""
+        A, B = relative_jacobians(self._poses[i], self._poses[j])
+        block = self._recovered.block
+        mixed = A @ block(i, j) @ B.T
+        covariance = _symmetric(A @ block(i, i) @ A.T + 2 * mixed + B @ block(j, j) @ B.T)
+        return UncertainPose(relative(self._poses[i], self._poses[j]), covariance)
+
+    @property
+    def _recovered(self) -> "_Recovery":
+        if self._recovery is None:
+            self._check_connected()
+            self._recovery = _Recovery(_factor(self._linearised(self._poses, 1.0)[0]))
+        return self._recovery
+
+    def _check_connected(self) -> None:
+        ones = np.ones(len(self._ends), np.int8)
+        edges = coo_array((ones, tuple(self._ends.T)), shape=(len(self), len(self)))
+        parts, part = connected_components(edges, directed=False)
+        if parts > 1:
+            loose = int(np.flatnonzero(part != part[0])[0])
+            raise LocalizationError(f"No way leads from node 0 to node {loose}: connect every node first.")
+
+    def _heat(self) -> float:
+        """How much later than usual doubts about new edges must begin for all of them to count.
+
+        A true loop that bends a stiff graph disagrees with it at first; doubted at once, it would never bend it.
+        """
+        new = slice(self._settled, None)
+        return max(1.0, float((self.chi_square[new] / self._doubts[new]).max(initial=0)))
+
+    def _linearised(self, poses: Array, heat: float) -> tuple[csc_matrix, Array, float]:
+        """Information matrix H (3 N, 3 N), gradient b (3 N,) and chi-square at the poses, the first one fixed."""
+        blocks, b = np.empty((len(self._ends), 6, 6)), np.zeros(3 * len(poses))
+        doubts = heat * self._doubts
+        chi2 = linearise(poses, self._ends, self._relatives, self._informations, doubts, blocks, b)
+        index = (3 * self._ends[:, :, None] + np.arange(3)).reshape(-1, 6)
+        row, column = np.broadcast_arrays(index[:, :, None], index[:, None, :])
+        entries = np.append(blocks.ravel(), [_FIXED] * 3)
+        places = np.append(row.ravel(), [0, 1, 2]), np.append(column.ravel(), [0, 1, 2])
+        return csc_matrix((entries, places), shape=(len(b), len(b))), b, chi2
+
+
+@dataclass(slots=True)
+class _Recovery:
+    """Blocks (3, 3) of the covariance from a factor of the information, three columns at a time [Eustice 2006]."""
+
+    factor: SuperLU
+    columns: dict[int, Array] = field(default_factory=dict)
+
+    def block(self, i: int, j: int) -> Array:
+        if j not in self.columns:
+            unit = np.zeros((self.factor.shape[0], 3))
+            unit[3 * j : 3 * j + 3] = np.eye(3)
+            self.columns[j] = self.factor.solve(unit)
+        return self.columns[j][3 * i : 3 * i + 3]
+
+
+def _symmetric(P: Array) -> Array:
+    """Without the rounding of a sparse solution."""
+    return (P + P.T) / 2
+
+
+def _factor(H: csc_matrix) -> SuperLU:
+    """Factor of a symmetric positive definite matrix."""
+    return splu(H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

@@ -1,0 +1,134 @@
+"""The last word on a map: all keyframes at once, by every patch of surface that several of them saw.
+
+A pose graph takes each match for a measurement of its own, though matches share scans: it cannot say what the map is
+worth. Here each patch counts once, and how far patches scatter is measured: noise times a factor, and the unevenness
+that all patches of one view of one place share.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import SuperLU, splu
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import UncertainPose, pose_difference, relative, relative_jacobians, wrap
+from lidarcore.mapping.adjustment import Sightings, Sums, normal_equations
+from lidarcore.mapping.patches import Patches
+
+_FIXED = 1e12  # information of the first pose
+_SETTLED = 1e-4  # m and rad
+_LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """How keyframe j was reached from keyframe i as far as motion alone tells: T_i_j (3,), covariance (3, 3)."""
+
+    i: int
+    j: int
+    pose: Array
+    covariance: Array
+
+
+@dataclass(slots=True, eq=False)
+class Refined:
+    """Poses (K, 3) with their joint covariance; and what was measured of the surfaces.
+
+    scale       times the patches' own variances, which noise really has
+    unevenness  m, standard deviation that all patches of one view of one place share
+    """
+
+    poses: Array
+    scale: float
+    unevenness: float
+    _factor: SuperLU
+    _columns: dict[int, Array] = field(default_factory=dict)
+
+    def covariance(self, i: int) -> Array:
+        """Covariance (3, 3) of pose i, given the first."""
+        block = self._block(i, i)
+        return (block + block.T) / 2
+
+    def relative(self, i: int, j: int) -> UncertainPose:
+        """T_i_j with its covariance."""
+        A, B = relative_jacobians(self.poses[i], self.poses[j])
+        mixed = A @ self._block(i, j) @ B.T
+        P = A @ self._block(i, i) @ A.T + mixed + mixed.T + B @ self._block(j, j) @ B.T
+        return UncertainPose(relative(self.poses[i], self.poses[j]), (P + P.T) / 2)
+
+    def _block(self, i: int, j: int) -> Array:
+        if j not in self._columns:
+            unit = np.zeros((3 * len(self.poses), 3))
+            unit[3 * j : 3 * j + 3] = np.eye(3)
+            self._columns[j] = self._factor.solve(unit)
+        return self._columns[j][3 * i : 3 * i + 3]
+
+
+def refine(scans: list[Patches], poses: Array, steps: list[Step], size: float, rounds: int = 12) -> Refined:
+    """Adjust poses (K, 3) that are right to about a cell's `size` m; the first one stays.
+
+    steps tie keyframes by odometry or the going on of the motion: what is known where surfaces say nothing.
+    """
+    seen = _sightings(scans)
+    poses, scale, unevenness = poses.copy(), 1.0, 0.005
+    for _ in range(rounds):
+        sums, cells = normal_equations(seen, poses, size, scale, unevenness)
+        H, g = _with_steps(sums, poses, steps)
+        factor = _factor(H)
+        step = factor.solve(-g).reshape(-1, 3)
+        poses = poses + step
+        poses[:, 2] = wrap(poses[:, 2])
+        scale, unevenness = _measured(sums.groups, cells, len(poses))
+        if np.abs(step).max() < _SETTLED:
+            break
+    sums, _ = normal_equations(seen, poses, size, scale, unevenness)
+    return Refined(poses, scale, unevenness, _factor(_with_steps(sums, poses, steps)[0]))
+
+
+def _sightings(scans: list[Patches]) -> Sightings:
+    numbers = np.repeat(np.arange(len(scans)), [len(scan.means) for scan in scans])
+    columns = zip(*((scan.means, scan.normals, scan.variances) for scan in scans), strict=True)
+    return Sightings(numbers, *(np.concatenate(column) for column in columns))
+
+
+def _with_steps(sums: Sums, poses: Array, steps: list[Step]) -> tuple[csc_array, Array]:
+    """The normal equations with the steps, as far as they agree with the poses, and the first pose fixed."""
+    H, g = sums.information, sums.gradient.copy()
+    ends = np.array([(step.i, step.j) for step in steps], np.int64).reshape(-1, 2)
+    z = np.array([step.pose for step in steps]).reshape(-1, 3)
+    W = np.linalg.inv(np.array([step.covariance for step in steps]).reshape(-1, 3, 3))
+    a, b = poses[ends[:, 0]], poses[ends[:, 1]]
+    A, B = relative_jacobians(a, b)
+    e = pose_difference(relative(a, b), z)
+    chi2 = np.einsum("ni,nij,nj->n", e, W, e)
+    W = W * (np.minimum(1.0, 2 / (1 + chi2 / 11.34)) ** 2)[:, None, None]
+    J = np.concatenate([A, B], -1)
+    blocks = np.swapaxes(J, -1, -2) @ W @ J
+    index = (3 * ends[:, :, None] + np.arange(3)).reshape(-1, 6)
+    np.add.at(g, index, np.einsum("nki,nkl,nl->ni", J, W, e))
+    row, column = np.broadcast_arrays(index[:, :, None], index[:, None, :])
+    fixed = np.zeros(len(g))
+    fixed[:3] = _FIXED
+    tied = csc_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=H.shape)
+    return csc_array(H + tied + diags_array(fixed)), g
+
+
+def _measured(groups: Array, cells: int, keyframes: int) -> tuple[float, float]:
+    """Factor of the noise's variance, and the standard deviation of what a group shares, from their residuals."""
+    free = 1 - 3 * keyframes / max(len(groups) - 2 * cells, 3 * keyframes + 1)
+    kept = groups[:, 2] > 0.2
+    squares, noise = groups[kept, 0] / (groups[kept, 2] * max(free, 0.2)), groups[kept, 1]
+    scale, shared = 1.0, 0.005**2
+    for _ in range(10):
+        expected = scale * noise + shared
+        inner = squares < _LARGEST * expected
+        rows = np.stack([noise, np.ones(len(noise))], -1)[inner] / expected[inner, None]
+        (scale, shared), _ = nnls(rows, squares[inner] / expected[inner])
+        scale = max(scale, 0.01)
+    return float(scale), float(np.sqrt(shared))
+
+
+def _factor(H: csc_array) -> SuperLU:
+    return splu(H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

@@ -1,0 +1,50 @@
+"""What is to be found in a map: the points of one scan, or of the last keyframes as they lie to each other."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.errors import LocalizationError
+from lidarcore.geometry import compose, inverse
+from lidarcore.mapping.relocation.settings import RelocationSettings
+from lidarcore.scan import Scan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Query:
+    """N points (N, 2) m and where each was seen from (N, 2) m, both in the frame of the last scan's sensor."""
+
+    points: Array
+    origins: Array
+
+
+def query_of(
+    scans: Sequence[Scan], poses: Array | None = None, settings: RelocationSettings | None = None
+) -> Query:
+    """The query of scans at poses (K, 3) in any common frame; the last one's pose is what will be found.
+
+    One scan needs no pose. Points are thinned to a spacing, so that what is near does not count more than walls that
+    are far. Raises LocalizationError if there are no scans or not as many poses.
+    """
+    settings = settings or RelocationSettings()
+    poses = np.zeros((1, 3)) if poses is None else np.asarray(poses, np.float64)
+    if not len(scans) or poses.shape != (len(scans), 3) or not np.isfinite(poses).all():
+        raise LocalizationError(f"{len(scans)} scans and poses of shape {poses.shape}: give a pose for each.")
+    points, origins = [], []
+    for scan, pose in zip(scans, poses, strict=True):
+        x, y, heading = compose(inverse(poses[-1]), pose)
+        c, s = np.cos(heading), np.sin(heading)
+        seen = scan.xy[scan.valid & (scan.ranges <= settings.max_range)] @ np.array([[c, s], [-s, c]])
+        points.append(seen + np.array([x, y]))
+        origins.append(np.broadcast_to([x, y], seen.shape))
+    return Query(*_thinned(np.concatenate(points), np.concatenate(origins), settings))
+
+
+def _thinned(points: Array, origins: Array, settings: RelocationSettings) -> tuple[Array, Array]:
+    """One point a square of the spacing, and of these as many as settings allow, in a fixed random order."""
+    cells = np.floor(points / settings.spacing).astype(np.int64)
+    _, kept = np.unique(cells, axis=0, return_index=True)
+    kept = np.random.default_rng(0).permutation(kept)[: settings.most_points]
+    return points[kept], origins[kept]

@@ -1,0 +1,47 @@
+"""The pose between the cells: points are laid on what stands nearest, along the normal of the distance to it."""
+
+import numpy as np
+from scipy.ndimage import map_coordinates
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import wrap
+from lidarcore.mapping.relocation.field import FULL, Field
+
+_ROUNDS = 10
+_FLOOR = 0.5  # cells: a map is not known better than this, however many points lie on it
+
+
+def refined(field: Field, points: Array, pose: Array) -> tuple[Array, Array]:
+    """Gauss-Newton on the fits of points (N, 2) from a pose (3,), all in cells: the pose and its covariance.
+
+    [Kohlbrecher et al. 2011], with the covariance of point positions of half a cell that are wrong together.
+    """
+    level = field.levels[0].astype(np.float64) / FULL
+    dy, dx = np.gradient(level)
+    pose = pose.copy()
+    for _ in range(_ROUNDS):
+        fit, J = _linearised(level, dx, dy, points, pose)
+        H = J.T @ J + 1e-6 * np.eye(3)
+        step = np.linalg.solve(H, J.T @ (1 - fit))
+        step *= min(1.0, 1.0 / max(np.hypot(*step[:2]), 1e-12), 0.02 / max(abs(step[2]), 1e-12))
+        moved: Array = pose + step
+        if _linearised(level, dx, dy, points, moved)[0].sum() <= fit.sum():
+            break
+        pose = moved.astype(np.float64)
+    pose[2] = wrap(pose[2])
+    _, J = _linearised(level, dx, dy, points, pose)
+    norm = np.hypot(J[:, 0], J[:, 1])
+    used = norm > 1e-3
+    N = J[used] / norm[used][:, None]  # the normals, and the levers that go with them
+    information = N.T @ N / max(len(N), 1) / _FLOOR**2
+    covariance = np.linalg.inv(information + 1e-6 * np.eye(3)).astype(np.float64)
+    return pose, covariance
+
+
+def _linearised(level: Array, dx: Array, dy: Array, points: Array, pose: Array) -> tuple[Array, Array]:
+    """Fits (N,) of points at a pose and their Jacobian (N, 3)."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    x, y = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
+    at = np.stack([y + pose[1] - 0.5, x + pose[0] - 0.5])
+    fit, gx, gy = (map_coordinates(table, at, order=1) for table in (level, dx, dy))
+    return fit, np.stack([gx, gy, -y * gx + x * gy], -1)

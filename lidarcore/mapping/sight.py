@@ -1,0 +1,52 @@
+"""What a scan saw, and what it looked through: where another scan should agree with it, and where it cannot."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.compiled import kernel
+from lidarcore.scan import Scan
+
+_APART = 0.1  # rad between beams from which on the sensor did not look between them
+
+
+class Sight(NamedTuple):
+    """The returns of a scan in the order of their bearings: bearings (N,) rad in [-pi, pi), ranges (N,) m."""
+
+    bearings: Array
+    ranges: Array
+
+
+def sight(scan: Scan) -> Sight:
+    """The returns of a scan."""
+    bearings = (scan.bearings[scan.valid] + np.pi) % (2 * np.pi) - np.pi
+    order = np.argsort(bearings, kind="stable")
+    return Sight(bearings[order], scan.ranges[scan.valid][order])
+
+
+@kernel
+def agreement(reference: Sight, scan: Sight, pose: Array, margin: float) -> tuple[float, float]:
+    """Shares of the scan's points that lie about where the reference saw something, and nearer than that.
+
+    pose (3,) is T_reference_scan, margin in m, and a tenth of the range; points where the reference saw nothing count
+    as neither.
+    """
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    N, last, seen, nearer = len(scan.bearings), len(reference.bearings) - 1, 0, 0
+    for i in range(N):
+        x, y = scan.ranges[i] * np.cos(scan.bearings[i]), scan.ranges[i] * np.sin(scan.bearings[i])
+        u, v = pose[0] + c * x - s * y, pose[1] + s * x + c * y
+        k = np.searchsorted(reference.bearings, np.arctan2(v, u))
+        if k == 0 or k > last or reference.bearings[k] - reference.bearings[k - 1] > _APART:
+            continue
+        near, far = reference.ranges[k - 1], reference.ranges[k]
+        if near > far:
+            near, far = far, near
+        rho = np.hypot(u, v)
+        slack = margin + 0.1 * rho
+        if rho < near - slack:
+            nearer += 1
+        elif rho < far + slack:
+            seen += 1
+    return seen / max(N, 1), nearer / max(N, 1)

@@ -1,0 +1,94 @@
+"""The patches of several scans as one map of surface elements, with a grid to find them by."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.compiled import kernel
+from lidarcore.geometry import act, rotation
+from lidarcore.mapping.cells import cells
+from lidarcore.mapping.patches import Patches
+
+_GAP = 0.1  # m between two surfaces side by side
+_CELLS = 4_000_000  # of the grid; a map wider than that is cut
+
+
+class Surfels(NamedTuple):
+    """M surface elements in the frame of the map, sorted by the cells of a grid.
+
+    means, normals  (M, 2)
+    variances       (M,) m² of a mean along its normal
+    tilts           (M,) rad² variance of the normal's direction
+    low             (2,) m corner of the grid
+    cell            m
+    first           (W, H + 1) index of the first element of each cell; those of a column of cells follow each other
+    """
+
+    means: Array
+    normals: Array
+    variances: Array
+    tilts: Array
+    low: Array
+    cell: float
+    first: Ints
+
+
+def surfels(scans: Sequence[Patches], poses: Array, size: float, cell: float) -> Surfels:
+    """Elements of `size` m from patches of scans at poses (K, 3), to be found within `cell` m."""
+    means = np.concatenate([act(pose, scan.means) for pose, scan in zip(poses, scans, strict=True)])
+    normals = np.concatenate(
+        [scan.normals @ rotation(pose[2]).T for pose, scan in zip(poses, scans, strict=True)]
+    )
+    weights = 1 / np.concatenate([scan.variances for scan in scans])
+    tilts = np.concatenate([scan.tilts for scan in scans])
+    key = cells(means, normals, size, _GAP)
+    order = np.argsort(key, kind="stable")
+    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
+    columns = np.column_stack([weights[:, None] * np.hstack([means, normals, tilts[:, None]]), weights])
+    sums = np.add.reduceat(columns[order], starts) if len(starts) else np.empty((0, 6))
+    number = np.diff(starts, append=len(order))
+    total = sums[:, 5]
+    mean, tilt = sums[:, :2] / total[:, None], sums[:, 4] / total / number
+    length = np.hypot(sums[:, 2], sums[:, 3])
+    return _sorted(mean, sums[:, 2:4] / length[:, None], 1 / total, tilt, cell)
+
+
+def _sorted(means: Array, normals: Array, variances: Array, tilts: Array, cell: float) -> Surfels:
+    low = means.min(axis=0) - cell if len(means) else np.zeros(2)
+    at = np.floor((means - low) / cell).astype(np.int64)
+    shape = np.minimum(at.max(axis=0, initial=0) + 2, int(np.sqrt(_CELLS)))
+    kept = np.flatnonzero((at < shape).all(axis=1))
+    flat = at[kept, 0] * (shape[1] + 1) + at[kept, 1]
+    order = kept[np.argsort(flat, kind="stable")]
+    first = np.zeros((shape[0], shape[1] + 1), np.int64)
+    _index(at[order], first)
+    return Surfels(means[order], normals[order], variances[order], tilts[order], low, cell, first)
+
+
+@kernel
+def _index(at: Ints, first: Ints) -> None:
+    """Where the elements (M, 2), sorted, of each cell begin."""
+    k = 0
+    for i in range(first.shape[0]):
+        for j in range(first.shape[1]):
+            first[i, j] = k
+            while k < len(at) and at[k, 0] == i and at[k, 1] == j:
+                k += 1
+
+
+@kernel
+def nearest(map: Surfels, x: float, y: float, nx: float, ny: float, reach: float, side: float) -> int:
+    """The element nearest to a place whose normal makes a cosine of at least `side` with (nx, ny); -1 if none."""
+    i, j = int(np.floor((x - map.low[0]) / map.cell)), int(np.floor((y - map.low[1]) / map.cell))
+    found, closest = -1, reach * reach
+    low, high = max(j - 1, 0), min(j + 2, map.first.shape[1] - 1)
+    if low >= high:
+        return -1
+    for a in range(max(i - 1, 0), min(i + 2, map.first.shape[0])):
+        for k in range(map.first[a, low], map.first[a, high]):
+            square = (map.means[k, 0] - x) ** 2 + (map.means[k, 1] - y) ** 2
+            if square < closest and map.normals[k, 0] * nx + map.normals[k, 1] * ny > side:
+                found, closest = k, square
+    return found

@@ -1,0 +1,20 @@
+"""Walls of a map: the segments of all keyframes as lines with ends, corners and covariances."""
+
+from lidarcore.mapping.walls.query import along, distances, in_box, nearest
+from lidarcore.mapping.walls.settings import WallSettings
+from lidarcore.mapping.walls.spread import Spread, common_spread, joint_spread
+from lidarcore.mapping.walls.walls import WallCorners, Walls, find_walls
+
+__all__ = [
+    "Spread",
+    "WallCorners",
+    "WallSettings",
+    "Walls",
+    "along",
+    "common_spread",
+    "distances",
+    "find_walls",
+    "in_box",
+    "joint_spread",
+    "nearest",
+]

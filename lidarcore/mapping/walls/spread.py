@@ -1,0 +1,57 @@
+"""How keyframes' poses err together: what a map's covariances need to know of them.
+
+A spread takes M (R, 3 K), by which R quantities move with the poses, and gives M Cov(poses) M^T (R, R).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+
+from lidarcore.arrays import Array
+from lidarcore.errors import CovarianceError
+
+Spread = Callable[[csr_array], Array]
+
+
+def common_spread(covariances: ArrayLike) -> Spread:
+    """Of covariances (K, 3, 3) of single poses: whatever moves one keyframe is taken to move all, each by its share.
+
+    That is what drift does to keyframes that see the same wall. Raises CovarianceError.
+    """
+    C = np.asarray(covariances, np.float64)
+    if C.ndim != 3 or C.shape[1:] != (3, 3) or not np.isfinite(C).all():
+        raise CovarianceError(f"The covariances have shape {C.shape}: give (K, 3, 3), all finite.")
+    roots = _roots(C).reshape(-1, 3)
+
+    def spread(M: csr_array) -> Array:
+        moved = M @ roots
+        covariance: Array = moved @ moved.T
+        return covariance
+
+    return spread
+
+
+def joint_spread(covariance: ArrayLike) -> Spread:
+    """Of the covariance (3 K, 3 K) of all poses: exact. Raises CovarianceError."""
+    C = np.asarray(covariance, np.float64)
+    if C.ndim != 2 or C.shape[0] != C.shape[1] or C.shape[0] % 3 or not np.isfinite(C).all():
+        raise CovarianceError(f"The covariance has shape {C.shape}: give (3 K, 3 K), all finite.")
+
+    def spread(M: csr_array) -> Array:
+        columns = np.unique(M.indices)
+        dense = M[:, columns].toarray()
+        result: Array = dense @ C[np.ix_(columns, columns)] @ dense.T
+        return result
+
+    return spread
+
+
+def _roots(C: Array) -> Array:
+    """Symmetric roots (K, 3, 3): unlike triangular ones, they change little where the covariance does."""
+    values, vectors = np.linalg.eigh((C + C.swapaxes(1, 2)) / 2)
+    if (values < -1e-9 * np.abs(values).max(initial=1e-30)).any():
+        raise CovarianceError("A covariance of a pose is not positive: give what the mapper gives.")
+    roots: Array = (vectors * np.sqrt(np.maximum(values, 0))[:, None]) @ vectors.swapaxes(1, 2)
+    return roots

@@ -1,0 +1,162 @@
+"""The walls of a map, with covariances: the algorithm on one screen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.sparse import csr_array, vstack
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import wrap
+from lidarcore.mapping.grid.occupancy import Mask, OccupancyGrid
+from lidarcore.mapping.walls.ends import find_end
+from lidarcore.mapping.walls.grouping import group_pieces
+from lidarcore.mapping.walls.meetings import Meetings, find_meetings
+from lidarcore.mapping.walls.model import WallModel, corner_rows, wall_model
+from lidarcore.mapping.walls.parts import Part, find_parts
+from lidarcore.mapping.walls.pieces import collect_pieces
+from lidarcore.mapping.walls.settings import WallSettings
+from lidarcore.mapping.walls.spread import Spread, common_spread
+from lidarcore.scan import Scan
+from lidarcore.settings import ExtractionSettings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WallCorners:
+    """C corners where walls meet.
+
+    xy          (C, 2) m
+    covariance  (C, 2, 2) m²
+    walls       (C, 2) which two
+    rows        (2 C, 4 W) how they follow from what was estimated of walls, for `WallModel.covariance`
+    """
+
+    xy: Array
+    covariance: Array
+    walls: Ints
+    rows: csr_array = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.xy)
+
+    def rows_of(self, k: int) -> csr_array:
+        """Rows (2, 4 W) of one corner."""
+        return self.rows[2 * k : 2 * k + 2]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Walls:
+    """W walls in the world, each a surface seen from one side: x cos(alpha) + y sin(alpha) = r.
+
+    alpha            (W,) rad, in (-pi, pi]
+    r                (W,) m, >= 0
+    line_covariance  (W, 2, 2) of (alpha, r)
+    ends             (W, 2, 2) m; who looks from the first to the second has the free side on the left
+    end_covariance   (W, 4, 4) of both ends, x and y; along the wall it means nothing where `ended` is false
+    ended            (W, 2) false where the wall may go on, for nobody looked past it
+    in_corner        (W, 2) true where an end is a corner
+    length           (W,) m
+    length_variance  (W,) m²
+    first_seen       (W,) s
+    last_seen        (W,) s
+    count            (W,) number of keyframes that saw it
+    corners          where walls meet
+    model            what the covariances come from, for what walls have in common
+    """
+
+    alpha: Array
+    r: Array
+    line_covariance: Array
+    ends: Array
+    end_covariance: Array
+    ended: Mask
+    in_corner: Mask
+    length: Array
+    length_variance: Array
+    first_seen: Array
+    last_seen: Array
+    count: Ints
+    corners: WallCorners
+    model: WallModel = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.alpha)
+
+    def __repr__(self) -> str:
+        return f"Walls({len(self)} walls, {self.length.sum():.1f} m, {len(self.corners)} corners)"
+
+
+def find_walls(
+    scans: Sequence[Scan],
+    poses: Array,
+    spread: Spread | Array,
+    grid: OccupancyGrid,
+    settings: WallSettings | None = None,
+    extraction: ExtractionSettings | None = None,
+) -> Walls:
+    """The walls that keyframes saw and the grid still has.
+
+    scans at poses (K, 3), T_world_sensor; spread says how the poses err together, or is their covariances (K, 3, 3).
+    """
+    settings, extraction = settings or WallSettings(), extraction or ExtractionSettings()
+    poses = np.asarray(poses, np.float64).reshape(-1, 3)
+    pieces = collect_pieces(scans, poses, extraction)
+    parts = find_parts(pieces, group_pieces(pieces, settings), grid, settings)
+    ends = [(find_end(pieces, part, 0), find_end(pieces, part, 1)) for part in parts]
+    meetings = find_meetings(parts, settings)
+    spread = spread if callable(spread) else common_spread(spread)
+    model = wall_model(pieces, parts, ends, meetings, spread, len(scans), extraction.noise.systematic)
+    xy = np.array([[part.fit.point(end.t) for end in pair] for part, pair in zip(parts, ends, strict=True)])
+    xy = xy.reshape(-1, 2, 2)
+    xy[meetings.walls[:, 0], meetings.side] = meetings.xy
+    ended = np.array([[end.seen for end in pair] for pair in ends], bool).reshape(-1, 2)
+    in_corner = np.zeros_like(ended)
+    in_corner[meetings.walls[:, 0], meetings.side] = True
+    stamps = np.array([scan.stamp for scan in scans])
+    seen = [np.unique(pieces.keyframe[part.members]) for part in parts]
+    covariances = model.of_walls()
+    length, variance = _lengths(xy, covariances[:, 2:, 2:])
+    alpha, r = _hesse(parts)
+    return Walls(
+        alpha,
+        r,
+        covariances[:, :2, :2],
+        xy,
+        covariances[:, 2:, 2:],
+        ended | in_corner,
+        in_corner,
+        length,
+        variance,
+        np.array([stamps[k].min() for k in seen]),
+        np.array([stamps[k].max() for k in seen]),
+        np.array([len(k) for k in seen], np.int64),
+        _corners(parts, meetings, model),
+        model,
+    )
+
+
+def _hesse(parts: list[Part]) -> tuple[Array, Array]:
+    alpha = np.array([part.fit.alpha for part in parts])
+    r = np.array([part.fit.normal @ part.fit.centre for part in parts])
+    return wrap(np.where(r < 0, alpha + np.pi, alpha)), np.abs(r)
+
+
+def _lengths(ends: Array, covariance: Array) -> tuple[Array, Array]:
+    difference = ends[:, 1] - ends[:, 0]
+    length = np.hypot(difference[:, 0], difference[:, 1])
+    along = difference / np.maximum(length, 1e-12)[:, None]
+    J = np.concatenate([-along, along], axis=1)
+    return length, (J[:, None] @ covariance @ J[:, :, None])[:, 0, 0]
+
+
+def _corners(parts: list[Part], meetings: Meetings, model: WallModel) -> WallCorners:
+    """Every pair of walls once, however many of their ends meet there."""
+    pairs = np.sort(meetings.walls, axis=1)
+    _, first = np.unique(pairs, axis=0, return_index=True)
+    first = np.sort(first)
+    walls, xy = meetings.walls[first], meetings.xy[first]
+    if not len(walls):
+        return WallCorners(xy, np.empty((0, 2, 2)), walls, csr_array((0, 4 * len(parts))))
+    rows = [corner_rows(parts, int(i), int(j), at) for (i, j), at in zip(walls, xy, strict=True)]
+    stacked = csr_array(vstack(rows))
+    return WallCorners(xy, model.of_points(stacked), walls, stacked)

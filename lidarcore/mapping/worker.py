@@ -1,0 +1,79 @@
+"""A thread that works off what is put in its queue: whoever brings scans never waits for loops, grid or walls."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+class Worker(Generic[Item]):
+    """Calls job(item, waiting) for each item in turn, `waiting` being the number of those behind it.
+
+    idle  s without an item after which job(None, 0) is called; never if None
+    """
+
+    def __init__(self, job: Callable[[Item | None, int], None], name: str, idle: float | None = None) -> None:
+        self._job, self._idle = job, idle
+        self._queue: deque[Item] = deque()
+        self._filled = threading.Condition()
+        self._closing = self._busy = False
+        self._failure: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        self._thread.start()
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether items wait."""
+        return bool(self._queue)
+
+    def put(self, item: Item) -> None:
+        """Hand over an item, at once. Raises what ended the thread, if anything did."""
+        self._check()
+        with self._filled:
+            self._queue.append(item)
+            self._filled.notify_all()
+
+    def join(self) -> None:
+        """Wait until all items are done. Raises what ended the thread, if anything did."""
+        with self._filled:
+            self._filled.wait_for(lambda: self._failure or not (self._queue or self._busy))
+        self._check()
+
+    def end(self) -> None:
+        """End after the item at hand; returns at once."""
+        with self._filled:
+            self._closing = True
+            self._filled.notify_all()
+
+    def close(self, within: float | None = None) -> None:
+        """End after the item at hand, and wait for it, at most so many seconds."""
+        self.end()
+        self._thread.join(within)
+
+    def _check(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    def _run(self) -> None:
+        try:
+            while self._next():
+                pass
+        except BaseException as failure:  # told to whoever brings the next item
+            with self._filled:
+                self._failure = failure
+                self._filled.notify_all()
+
+    def _next(self) -> bool:
+        with self._filled:
+            self._busy = False
+            self._filled.notify_all()
+            self._filled.wait_for(lambda: self._queue or self._closing, self._idle)
+            if self._closing:
+                return False
+            self._busy = True
+            item = self._queue.popleft() if self._queue else None
+            waiting = len(self._queue)
+        self._job(item, waiting)
+        return True

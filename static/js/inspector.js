@@ -1,0 +1,110 @@
+// A card over the view: the selected corner or wall, what each method claims of it, and how often that was so.
+
+import { changeSetting, select } from "./actions.js";
+import { KINDS } from "./boxes.js";
+import { $, el, iconButton, remake, setText, swatch } from "./dom.js";
+import { inspectedCorner } from "./inspected-corner.js";
+import { inspectedWall, mountInspectedWall } from "./inspected-wall.js";
+import { placer } from "./overlay/world.js";
+import { lookNow } from "./scene.js";
+import { claimsOf, plotScatter, scatterDrawing } from "./scatter.js";
+import { get, on } from "./store.js";
+
+const EXPECTED = 0.95;
+const SHOWN = ["frame", "selection", "wall", "length", "repeatability", "deviations", "wallDeviations", "settings"];
+
+let shown; // what the card is about
+
+const drawing = scatterDrawing();
+const title = el("span");
+const facts = el("dl", { class: "facts" });
+const rows = el("table", { class: "listing" });
+const ways = el("p", { class: "ways" });
+const caption = el("p", { class: "muted" });
+const counts = el("ul", { class: "held" });
+const start = el("button", { type: "button", title: "Keep the sensor still meanwhile" }, "Compare with the next scans");
+
+/** The card is made once: what a finger presses is still there when it is lifted. */
+export function mountInspector() {
+  mountInspectedWall();
+  start.addEventListener("click", () => changeSetting("repeatability.running", true));
+  const close = iconButton("close", "Close the inspector", () => select({ corner: null }));
+  $("inspector").append(el("h2", {}, title, close), facts, rows, ways, drawing, caption, counts, start);
+  for (const key of SHOWN) on([key], refresh);
+}
+
+function refresh() {
+  const frame = get("frame");
+  const thing = frame && (inspectedWall(frame) ?? inspectedCorner(frame));
+  $("inspector").hidden = !thing;
+  if (thing?.key !== shown) standAside(thing);
+  if (thing) draw(thing);
+}
+
+/** The card stands where the thing is not. */
+function standAside(thing) {
+  shown = thing?.key;
+  if (!thing) return;
+  const at = lookNow().toScreen(placer(get("frame").localization?.pose)(thing.at));
+  $("inspector").classList.toggle("left", Boolean(at) && at[0] > $("stage").clientWidth / 2);
+}
+
+/** `sighted` is what the last scans say of the thing, if they are compared; `claims` what this scan says. */
+function draw({ name, methods, sighted, deviations, claims, axes, ...thing }) {
+  const dots = (sighted && deviations?.id === sighted.id && deviations.deviations[methods[0]]) || [];
+  setText(title, name);
+  showFacts(thing.facts);
+  showRows(thing.rows);
+  showWays(thing.ways);
+  showHeld(sighted ? heldBy(sighted, methods) : []);
+  setText(caption, sighted ? `95\u2009% ellipses and ${dots.length} sightings by ${methods[0]} from their mean, ${axes}` : `95\u2009% ellipses of this scan, ${axes}`);
+  start.hidden = get("settings").repeatability.running;
+  plotScatter(drawing, sighted ? claimsOf(chosen(sighted.methods, methods)) : claims, dots);
+  drawing.setAttribute("aria-label", `${name}: ellipses of ${methods.join(", ")}, and where it was seen`);
+}
+
+function showFacts(pairs) {
+  remake(facts, pairs, () => pairs.map(([name, text]) => el("div", {}, el("dt", {}, name), el("dd", {}, text))));
+}
+
+/** What each method says, in a row each. */
+function showRows(wanted) {
+  const rowOf = ([method, texts]) =>
+    el("tr", {}, el("th", { scope: "row", class: "name" }, swatch(method), method), ...texts.map((text) => el("td", {}, text)));
+  const heads = ["Method", "α, °", "σ, °", "r, m", "σ, mm"].map((text, at) => el("th", { scope: "col", class: at ? "" : "name" }, text));
+  rows.hidden = !wanted.length;
+  remake(rows, wanted, () => [el("thead", {}, el("tr", {}, ...heads)), el("tbody", {}, ...wanted.map(rowOf))]);
+}
+
+/** Buttons to what the thing is made of, or part of: [text, run]. They stay, so that none is gone while it is pressed. */
+function showWays(wanted) {
+  while (ways.children.length < wanted.length) ways.append(el("button", { type: "button" }));
+  [...ways.children].forEach((button, at) => {
+    const [text, run] = wanted[at] ?? ["", null];
+    button.hidden = !run;
+    button.onclick = run;
+    setText(button, text);
+  });
+}
+
+function showHeld(held) {
+  remake(counts, held, () => held.map(entry));
+}
+
+const chosen = (all, names) => Object.fromEntries(names.filter((name) => all[name]).map((name) => [name, all[name]]));
+
+/** How many of the sightings each method's 95 % ellipses hold: {method, kind, inside, count}. */
+function heldBy({ methods: all }, names) {
+  return Object.entries(chosen(all, names)).flatMap(([method, { count, claims }]) =>
+    KINDS.map((kind) => {
+      const share = claims[kind].judgement.coverage_95.value;
+      return { method, kind, count, inside: share === null ? null : Math.round(share * count) };
+    }),
+  );
+}
+
+function entry({ method, kind, inside, count }) {
+  const title = get("methods").find(({ name }) => name === method).title;
+  const words = inside === null ? "too few sightings yet" : `${inside} of ${count} inside, ${Math.round(EXPECTED * count)} expected`;
+  return el("li", { "data-method": method, "data-kind": kind }, swatch(method), `${title} ${kind}: ${words}`);
+}

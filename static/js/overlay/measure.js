@@ -1,0 +1,63 @@
+// Measuring: two clicks that snap to corners and walls; the server says how far they are from each other, and how sure.
+
+import { attempt } from "../actions.js";
+import { request } from "../api.js";
+import { $, setText } from "../dom.js";
+import { get, set } from "../store.js";
+import { degrees, metres, millimetres } from "../units.js";
+
+const HINT = "Click two corners or walls";
+
+/** Whether clicks measure; the store has {first, second, found} as "measure", null while they select. */
+export const isMeasuring = () => Boolean(get("measure"));
+
+export function toggleMeasure() {
+  set("measure", isMeasuring() ? null : {});
+  $("measure").setAttribute("aria-pressed", String(isMeasuring()));
+  say();
+}
+
+/** Ends measuring. Returns whether it was on. */
+export function cancelMeasure() {
+  const was = isMeasuring();
+  if (was) toggleMeasure();
+  return was;
+}
+
+/** Takes what was clicked, {kind, at}; the third click begins anew. Null is a click beside everything. */
+export async function measureFrom(thing) {
+  if (!thing) return say("Nothing to measure there: click a corner or a wall");
+  const { first, second } = get("measure");
+  if (!first || second) set("measure", { first: thing });
+  else await measure(first, thing);
+  say();
+}
+
+async function measure(first, second) {
+  const [from, to] = [first, second].map(({ kind, at }) => `${kind}@${at.map((value) => value.toFixed(4)).join(",")}`);
+  const found = await attempt(() => request("GET", `measure?first=${from}&second=${to}`), "This could not be measured");
+  if (isMeasuring()) set("measure", found ? { first: found.first, second: found.second, found } : {});
+}
+
+/** "3.412 m ± 9 mm", and the angle where there is one. */
+export function measureText({ distance, sigma, angle, angle_sigma: turn }) {
+  const length = `${metres(distance)}\u2009m ± ${millimetres(sigma)}\u2009mm`;
+  return angle === null ? length : `${length}, ${degrees(angle)}° ± ${degrees(turn)}°`;
+}
+
+function say(words) {
+  const measured = get("measure");
+  $("measure-text").hidden = !measured;
+  setText($("measure-text"), words ?? (measured?.found ? measureText(measured.found) : HINT));
+}
+
+/** Draws the line that is measured, and what it says. */
+export function drawMeasure(pen, look, { ring, text, halo }) {
+  const { first, second, found } = get("measure") ?? {};
+  const ends = [first, second].filter(Boolean).map(({ at }) => look.toScreen(at)).filter(Boolean);
+  for (const end of ends) pen.disc(end, 5, { stroke: ring, width: 2 });
+  if (ends.length < 2) return;
+  pen.path(ends, { stroke: ring, width: 2 });
+  const [[x0, y0], [x1, y1]] = ends;
+  pen.text([(x0 + x1) / 2, (y0 + y1) / 2 - 8], measureText(found), { fill: text, halo, anchor: "middle" });
+}

@@ -1,0 +1,101 @@
+"""SLAM from whole scans on a real server that plays a simulated robot: pose, grid and walls over REST."""
+
+import io
+from collections.abc import Iterator
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import pytest
+from PIL import Image
+from serving import Server, assert_problem, wait_until
+
+from lidarcore.mapping.grid import read_ros_map, shades_of
+
+WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
+LANDMARKS = {"navigation": {"mode": "slam", "method": "landmarks"}}
+ROBOT = {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}}
+
+
+@pytest.fixture
+def driving(tmp_path: Path, background: Path) -> Iterator[Server]:
+    server = Server(tmp_path / "recordings", recording=background)
+    server.change("PUT", "/source", ROBOT)
+    yield server
+    server.stop()
+
+
+def free_area(server: Server) -> float:
+    """m² that the grid says are free; 0 if there is none yet."""
+    answer = server.http.get("/map/grid")
+    if answer.status_code == 404:
+        return 0.0
+    shades = np.asarray(Image.open(io.BytesIO(answer.content)))
+    return float((shades == 254).sum()) * float(answer.headers["Grid-Resolution"]) ** 2
+
+
+def first_pose(server: Server) -> dict[str, float]:
+    """Where the trajectory begins; at stamp 0 while it has no pose yet."""
+    poses = server.get("/trajectory", limit=10_000)["poses"]
+    return poses[0] if poses else {"stamp": 0.0, "x": 0.0, "y": 0.0, "heading": 0.0}
+
+
+def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
+    driving: Server, tmp_path: Path
+) -> None:
+    assert driving.get("/settings")["navigation"]["method"] == "scans"
+    assert "scans" in assert_problem(driving.http.get("/map/grid"), 404)["detail"]
+    driving.change("PATCH", "/settings", WHOLE_SCANS)
+
+    # A room has 5.9 m by 5 m: from its middle nearly all of it is seen, and more through the doors as the robot goes.
+    wait_until(lambda: free_area(driving) > 20, "most of the room is free")
+    wait_until(lambda: free_area(driving) > 35, "the room beside it is seen, too")
+    wait_until(lambda: driving.http.get("/walls").status_code == 200, "there are walls")
+    walls = driving.get("/walls")["walls"]
+    longest = max(walls, key=lambda wall: wall["length"])
+    assert longest["length"] > 3
+    assert np.linalg.eigvalsh(longest["covariance"]).min() > 0
+    table = driving.http.get("/walls", params={"format": "csv"}).text.splitlines()
+    assert table[0].startswith("id,alpha_rad,r_m")
+
+    answer = driving.http.get("/walls/nearest", params={"x": 0, "y": 0, "k": 2, "min_length": 2}).json()
+    assert answer["distances"] == sorted(answer["distances"])
+    assert min(wall["length"] for wall in answer["walls"]) >= 2
+    x, y = np.mean([longest["start"], longest["end"]], axis=0)
+    around = driving.http.get(
+        "/walls", params={"x": x, "y": y, "radius": 0.3, "format": "csv"}
+    ).text.splitlines()
+    assert 2 <= len(around) <= len(table)
+    assert driving.http.get("/walls", params={"bbox": "90,90,99,99"}).json() == {"walls": []}
+    assert_problem(driving.http.get("/walls", params={"min_length": 3, "max_length": 2}), 422)
+
+    answer = driving.http.get("/map/grid", params={"format": "zip"})
+    with ZipFile(io.BytesIO(answer.content)) as archive:
+        assert {"map.pgm", "map.yaml", "walls.csv", "plan.svg", "plan.dxf"} <= set(archive.namelist())
+        archive.extractall(tmp_path / "map")
+    grid = read_ros_map(tmp_path / "map" / "map.yaml")
+    assert (shades_of(grid) == 254).sum() * grid.resolution**2 > 35
+
+    before = driving.next_frame()
+    where = before["localization"]
+    assert where["state"] == "tracking"
+    x, y, _ = where["truth"]
+    assert np.hypot(where["pose"]["x"] - x, where["pose"]["y"] - y) < 0.1
+    assert_problem(driving.http.post("/pose", json={"x": 1, "y": 0, "heading": 0}), 409)
+
+    driving.change("PATCH", "/settings", LANDMARKS)
+    wait_until(lambda: driving.http.get("/map/grid").status_code == 404, "no stale map stays")
+    driving.change("PATCH", "/settings", WHOLE_SCANS)
+    wait_until(lambda: free_area(driving) > 20, "a new map grows")
+    first = first_pose(driving)
+    assert first["stamp"] >= before["stamp"]
+    assert (first["x"], first["y"], first["heading"]) == pytest.approx((0, 0, 0), abs=1e-9)
+
+    # The scan in view begins the new map, so there may be no moment without one.
+    wait_until(
+        lambda: driving.next_frame()["stamp"] > first["stamp"], "the map is older than the scan in view"
+    )
+    driving.change("POST", "/localization/reset", None)
+    wait_until(lambda: first_pose(driving)["stamp"] > first["stamp"], "a reset begins a new map")
+    first = first_pose(driving)
+    assert (first["x"], first["y"], first["heading"]) == pytest.approx((0, 0, 0), abs=1e-9)

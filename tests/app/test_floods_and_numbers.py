@@ -1,0 +1,87 @@
+"""Too much odometry, too large pictures, numbers that are none, and what a refusal says."""
+
+from types import SimpleNamespace
+
+import pytest
+from lidarcore_app import isolation
+from lidarcore_app.sources import odometry_feed
+from lidarcore_app.sources.odometry_feed import MOST_PER_SECOND, OdometryFeed
+from serving import Server, assert_problem
+
+from lidarcore.localization import LocalizationSettings
+
+BODIES = [
+    ("PATCH", "/source", {"speed": False}),
+    ("POST", "/pose", {"x": True, "y": 0, "heading": 0}),
+    ("POST", "/pose", {"x": 0, "y": 0, "heading": 0, "sigma_position": True}),
+    ("POST", "/pose", {"x": 0, "y": 0, "heading": 0, "covariance": [[True, 0, 0], [0, 1, 0], [0, 0, 1]]}),
+    ("POST", "/odometry", {"stamp": True, "x": 0, "y": 0, "heading": 0}),
+    ("POST", "/odometry", [{"stamp": 0, "x": 0, "y": False, "heading": 0}]),
+    ("PUT", "/localization/map", {"session": True}),
+    ("PUT", "/source", {"kind": "simulation", "settings": {"seed": True}}),
+    ("PATCH", "/settings", {"view": {"ellipse_scale": True}}),
+]
+
+
+@pytest.mark.parametrize(("method", "path", "body"), BODIES)
+def test_true_and_false_are_no_numbers(shared_server: Server, method: str, path: str, body: object) -> None:
+    assert_problem(shared_server.http.request(method, path, json=body), 422)
+
+
+@pytest.mark.parametrize("speed", [0, 0.1, 2, 100])
+def test_speeds_are_numbers(shared_server: Server, speed: float) -> None:
+    assert shared_server.http.patch("/source", json={"speed": speed}).status_code == 200
+
+
+@pytest.mark.parametrize("speed", [0.05, -1, 101, "2"])
+def test_other_speeds_are_refused(shared_server: Server, speed: object) -> None:
+    assert_problem(shared_server.http.patch("/source", json={"speed": speed}), 422)
+
+
+def test_more_odometry_than_a_robot_sends_is_dropped_and_counted(monkeypatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(odometry_feed, "time", SimpleNamespace(monotonic=lambda: now))
+    feed, limits = OdometryFeed(), LocalizationSettings()
+    second = int(MOST_PER_SECOND)
+    taken = sum(feed.put(i * 1e-3, (0.0, 0.0, 0.0), limits) for i in range(3 * second))
+    assert taken == second
+    assert (feed.status().taken, feed.status().dropped) == (second, 2 * second)
+    now += 0.5
+    assert sum(feed.put(10 + i * 1e-3, (0.0, 0.0, 0.0), limits) for i in range(second)) == second // 2
+
+
+def test_allow_names_every_method_of_the_path(shared_server: Server) -> None:
+    answer = shared_server.http.delete("/source")
+    assert_problem(answer, 405)
+    assert answer.headers["Allow"] == "GET, PATCH, PUT"
+
+
+def test_every_route_with_a_body_says_that_it_may_be_no_json(shared_server: Server) -> None:
+    paths = shared_server.http.get(f"{shared_server.url}/openapi.json").json()["paths"]
+    bodies = [
+        operation for path in paths.values() for operation in path.values() if "requestBody" in operation
+    ]
+    assert len(bodies) > 10
+    assert all("400" in operation["responses"] for operation in bodies)
+
+
+def test_a_picture_of_more_pixels_than_allowed_is_refused(shared_server: Server) -> None:
+    far = {"format": "lidarcore landmarks", "version": 1, "unit": "m"}
+    places = [
+        {"x": x, "y": x, "var_x": 1e-4, "cov_xy": 0, "var_y": 1e-4, "kind": "corner"} for x in (0.0, 10.0)
+    ]
+    session = (
+        shared_server.http.post("/map", json=far | {"landmarks": places}).raise_for_status().json()["id"]
+    )
+    asked = {"session": session, "format": "png", "resolution": 0.001}
+    problem = assert_problem(shared_server.http.get("/map", params=asked), 422)
+    assert "more than 16000000: give a coarser resolution" in problem["detail"]
+    assert shared_server.http.get("/map", params=asked | {"resolution": 0.05}).status_code == 200
+
+
+def test_a_map_is_read_in_a_process_of_its_own(shared_server: Server, monkeypatch) -> None:
+    """One that says nothing for as long as is allowed here: it is ended, and the server goes on."""
+    monkeypatch.setattr(isolation, "QUIET", 0.0)
+    body = b'{"format": "lidarcore landmarks", "landmarks": [' + b"[]," * 300_000 + b"[]]}"
+    problem = assert_problem(shared_server.http.post("/map", content=body), 422)
+    assert "Reading the json was stopped" in problem["detail"]

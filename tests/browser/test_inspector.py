@@ -1,0 +1,118 @@
+"""The inspector: what it says of a wall is what REST says."""
+
+import re
+from math import cos, degrees, hypot, sin, sqrt
+from typing import Any
+
+import numpy as np
+import pytest
+from browsing import Visitor
+from playwright.sync_api import Locator, expect
+from waiting import wait_until
+
+LONG = 1.5  # m; corners are far from the middle of such a wall
+WINDOW = 20
+
+
+@pytest.fixture
+def compared(visitor: Visitor) -> Visitor:
+    """All methods, and a full window of repeatability; the sensor stands still."""
+    server = visitor.server
+    server.api.delete("repeatability").raise_for_status()
+    server.patch(
+        "settings", {"view": {"compare": True}, "repeatability": {"running": True, "window": WINDOW}}
+    )
+    wait_until(lambda: server.get("repeatability")["scans"] == WINDOW, "the window is full")
+    visitor.await_frame(server.pause())
+    return visitor
+
+
+def whole_wall(frame: dict[str, Any]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """A long wall of the main method with its two corners."""
+    main = frame["fitter"]
+    for wall in frame["segments"][main]:
+        ends = [
+            c["by_method"][main]
+            for c in frame["corners"]
+            if main in c["by_method"] and wall["id"] in c["segments"]
+        ]
+        if len(ends) == 2 and wall["length"] > LONG:
+            return wall, ends
+    raise AssertionError("the room has a wall between two corners")
+
+
+def alongside(wall: dict[str, Any], other: dict[str, Any]) -> float:
+    """How much of another method's wall lies along this one, m; a wall may be in two pieces on one line."""
+    normal = np.array([cos(wall["alpha"]), sin(wall["alpha"])])
+    ends = np.array([[other["start"], other["end"]], [wall["start"], wall["end"]]])
+    if np.abs(ends @ normal - wall["r"]).max() > 0.1:
+        return 0.0
+    along = np.sort(ends @ np.array([-normal[1], normal[0]]), axis=1)
+    return float(along[:, 1].min() - along[:, 0].max())
+
+
+def click(visitor: Visitor, wall: dict[str, Any]) -> Locator:
+    x, y = visitor.pixel_at([(a + b) / 2 for a, b in zip(wall["start"], wall["end"], strict=True)])
+    visitor.page.mouse.click(x, y + 2)
+    card = visitor.page.get_by_role("complementary", name="Inspector")
+    expect(card.get_by_role("heading", name="Wall")).to_be_visible()
+    return card
+
+
+def numbers(text: str) -> list[float]:
+    return [float(found) for found in re.findall(r"-?\d+\.\d+", text.replace("−", "-"))]
+
+
+def test_wall_clicked_tells_what_each_method_says_of_it(compared: Visitor) -> None:
+    frame = compared.server.get("frame")
+    wall, ends = whole_wall(frame)
+    card = click(compared, wall)
+    rows = card.locator("tbody tr")
+    expect(rows).to_have_count(len(frame["methods"]))
+    for method, row in zip(frame["methods"], rows.all(), strict=True):
+        expect(row.get_by_role("rowheader")).to_have_text(method)
+        said = max(frame["segments"][method], key=lambda one: alongside(wall, one))
+        (alphas, _), (_, rs) = said["covariance"]
+        wanted = [degrees(said["alpha"]), degrees(sqrt(alphas)), said["r"], 1e3 * sqrt(rs)]
+        assert numbers(" ".join(row.locator("td").all_inner_texts())) == pytest.approx(wanted, abs=0.051)
+    first, second = (f"corner@{end['x']:.4f},{end['y']:.4f}" for end in ends)
+    told = compared.server.get(f"measure?first={first}&second={second}")
+    expect(card).to_contain_text(
+        re.compile(rf"Corner to corner{told['distance']:.3f}.m ± {1e3 * told['sigma']:.1f}.mm")
+    )
+    expect(card).to_contain_text(f"Points{wall['n_points']}")
+    expect(card).to_contain_text("Covarianceconsistent")
+
+
+def test_wall_shows_its_repeatability(compared: Visitor) -> None:
+    frame = compared.server.get("frame")
+    wall, _ = whole_wall(frame)
+    card = click(compared, wall)
+    (mine,) = (
+        one
+        for one in compared.server.get("repeatability")["walls"]["methods"]
+        if one["name"] == frame["fitter"]
+    )
+    sighted = min(
+        mine["walls"], key=lambda one: hypot(one["mean"][0] - wall["alpha"], one["mean"][1] - wall["r"])
+    )
+    dots = compared.server.get(f"repeatability/walls/{sighted['id']}")["deviations"][frame["fitter"]]
+    expect(card.locator("circle.dot")).to_have_count(len(dots))
+    for kind, claim in sighted["claims"].items():
+        inside = round(claim["judgement"]["coverage_95"]["value"] * sighted["count"])
+        item = card.locator(f"li[data-method={frame['fitter']}][data-kind={kind}]")
+        expect(item).to_contain_text(f"{inside} of {sighted['count']} inside")
+
+
+def test_wall_and_corner_lead_to_each_other_and_escape_ends_both(compared: Visitor) -> None:
+    wall, _ = whole_wall(compared.server.get("frame"))
+    card = click(compared, wall)
+    assert compared.server.get("selection")["corner"] is None
+    corner = card.get_by_role("button", name=re.compile("^Corner ")).first
+    name = corner.inner_text()
+    corner.click()
+    expect(card.get_by_role("heading", name=name)).to_be_visible()
+    card.get_by_role("button", name=re.compile("^Wall ")).first.click()
+    expect(card.get_by_role("heading", name="Wall")).to_be_visible()
+    compared.page.keyboard.press("Escape")
+    expect(card).to_be_hidden()

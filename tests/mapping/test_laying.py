@@ -1,0 +1,148 @@
+"""Patches, surfels and how a scan is laid on them, against known motion, brute force and finite differences."""
+
+import numpy as np
+import pytest
+from mapping_scenes import NOISE, full_scan, sick_scan
+from scipy.spatial import cKDTree
+
+from lidarcore import Scan
+from lidarcore.geometry import act, compose, pose_difference, relative
+from lidarcore.mapping import MatchSettings
+from lidarcore.mapping.correlative import search
+from lidarcore.mapping.laying import lay, linearised
+from lidarcore.mapping.patches import patches
+from lidarcore.mapping.surfels import nearest, surfels
+from lidarcore.simulation import furnished_room, random_pose
+from lidarcore.simulation.rooms import rectangular_room
+
+MATCH = MatchSettings(noise=NOISE)
+ROOM = furnished_room()
+
+
+def map_of(scans, poses=None):
+    poses = np.zeros((len(scans), 3)) if poses is None else poses
+    return surfels([patches(scan, MATCH) for scan in scans], poses, MATCH.patch, MATCH.reach)
+
+
+@pytest.mark.parametrize("scanned", [full_scan, sick_scan])
+def test_patches_lie_on_walls_with_their_normals_towards_the_sensor(scanned):
+    rng = np.random.default_rng(1)
+    pose = random_pose(ROOM, rng)
+    seen = patches(scanned(ROOM, pose, NOISE, rng), MATCH)
+    assert len(seen.means) > 30
+    distances = [ROOM.clearance(*point) for point in act(pose, seen.means)]
+    assert np.median(distances) < 0.02
+    assert np.percentile(distances, 95) < 0.08
+    assert ((seen.means * seen.normals).sum(1) < 0).mean() > 0.95
+    np.testing.assert_allclose(np.hypot(*seen.normals.T), 1)
+
+
+def test_the_nearest_surfel_is_the_one_that_brute_force_finds():
+    rng = np.random.default_rng(2)
+    map = map_of([full_scan(ROOM, random_pose(ROOM, rng), NOISE, rng)])
+    places = map.means[rng.integers(len(map.means), size=300)] + rng.normal(0, 0.2, (300, 2))
+    normals = rng.normal(size=(300, 2))
+    normals /= np.hypot(*normals.T)[:, None]
+    for place, normal in zip(places, normals, strict=True):
+        distance = np.hypot(*(map.means - place).T)
+        allowed = (map.normals @ normal > 0.8) & (distance < MATCH.reach)
+        found = nearest(map, *place, *normal, MATCH.reach, 0.8)
+        assert found == (np.argmin(np.where(allowed, distance, np.inf)) if allowed.any() else -1)
+
+
+def test_a_scan_is_laid_where_it_was_taken():
+    rng = np.random.default_rng(3)
+    errors = []
+    for _ in range(40):
+        pose = random_pose(ROOM, rng)
+        step = rng.normal(0, [0.1, 0.1, 0.05])
+        map = map_of([full_scan(ROOM, pose, NOISE, rng)])
+        scan = patches(full_scan(ROOM, compose(pose, step), NOISE, rng), MATCH)
+        laid = lay(map, scan, np.zeros(3), np.zeros(3), np.diag([10.0, 10, 10]), MATCH.reach)
+        assert laid.inliers > 0.7
+        errors.append(pose_difference(laid.pose, step))
+    assert np.sqrt(np.mean(np.square(errors)[:, :2].sum(1))) < 0.006
+
+
+def test_along_a_corridor_the_guess_decides():
+    """Errors of the normals look like information there; they must not be taken for any."""
+    rng, corridor = np.random.default_rng(4), rectangular_room(120, 2.4)
+    prior, claims = np.diag([0.1, 0.1, 0.05]) ** 2, []
+    for _ in range(20):
+        pose = np.array([rng.uniform(-5, 5), rng.uniform(-0.5, 0.5), 0.0])
+        map = map_of([sick_scan(corridor, pose, NOISE, rng)])
+        guess = rng.normal(0, [0.1, 0.1, 0.05])
+        scan = patches(sick_scan(corridor, pose, NOISE, rng), MATCH)
+        laid = lay(map, scan, guess, guess, np.linalg.inv(prior), MATCH.reach)
+        claims.append(np.sqrt(np.linalg.inv(laid.information)[0, 0]))
+        assert abs(laid.pose[0] - guess[0]) < 4 * claims[-1]
+        assert abs(laid.pose[1]) < 0.03
+    assert np.median(claims) > 0.06
+
+
+def test_the_gradient_is_that_of_the_weighted_squares():
+    """Against finite differences, with the pairs and weights held: distances small enough not to change them."""
+    rng = np.random.default_rng(5)
+    pose = random_pose(ROOM, rng)
+    map = map_of([full_scan(ROOM, pose, NOISE, rng)])
+    scan = patches(full_scan(ROOM, pose, NOISE, rng), MATCH)
+    x, H, B, g = np.array([0.004, -0.003, 0.002]), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    linearised(map, scan, x, MATCH.reach, H, B, g)
+    places, turned = act(x, scan.means), act(x * [0, 0, 1], scan.normals)
+    pairs = np.array([nearest(map, *p, *n, MATCH.reach, 0.8) for p, n in zip(places, turned, strict=True)])
+    on, k = pairs >= 0, pairs[pairs >= 0]
+
+    def distances(x):
+        return ((act(x, scan.means[on]) - map.means[k]) * map.normals[k]).sum(1)
+
+    r = distances(x)
+    weights = 1 / (scan.variances[on] + map.variances[k] + r**2 / 4)
+    J = np.stack([(distances(x + d) - distances(x - d)) / 2e-6 for d in 1e-6 * np.eye(3)], -1)
+    np.testing.assert_allclose(g, J.T @ (weights * r), rtol=1e-5, atol=1e-4)
+    np.testing.assert_allclose(H, (J * weights[:, None]).T @ J, rtol=1e-5)
+
+
+def test_the_search_finds_the_best_pose_of_its_window_and_the_best_one_besides():
+    """Against all poses of the window, scored one by one with nearest neighbours."""
+    rng = np.random.default_rng(3)
+    settings = MatchSettings(cell=0.1, blur=0.15)
+    pose, step = np.array([4.5, 4.0, 0.4]), np.array([0.5, -0.3, 0.2])
+    reference = sick_scan(ROOM, pose, NOISE, rng).xy
+    points = sick_scan(ROOM, compose(pose, step), NOISE, rng).xy
+    guess, sigma = step + np.array([0.21, -0.33, 0.11]), np.array([0.2, 0.2, 0.1])
+    found = search(reference, points, guess, sigma, settings)
+    best = max(
+        _score(reference, points, guess + np.array([dx, dy, 0]), turn, guess, sigma, settings)
+        for dx in 0.1 * np.arange(-6, 7)
+        for dy in 0.1 * np.arange(-6, 7)
+        for turn in found[2] + (guess[2] - found[2]) * np.arange(-3, 4) / 3
+    )
+    assert _score(reference, points, found, found[2], guess, sigma, settings) >= best - 1e-3
+    other = search(reference, points, guess, 5 * sigma, settings, found[None])
+    away = relative(found, other)
+    assert np.hypot(*away[:2]) > 0.4 or abs(away[2]) > 0.24
+
+
+def _score(reference, points, pose, turn, guess, sigma, settings):
+    """Score of a pose as `search` defines it: Gaussians at the centres of cells, less the guess's penalty."""
+    c, s = np.cos(turn), np.sin(turn)
+    low = reference.min(axis=0) - (3 * settings.blur + 8 * settings.cell)
+    cells = np.floor((points @ np.array([[c, s], [-s, c]]) + pose[:2] - low) / settings.cell + 1e-9)
+    centres = low + (cells + 0.5) * settings.cell
+    distance, _ = cKDTree(reference).query(centres)
+    scores = np.where(distance < 3 * settings.blur, np.exp(-(distance**2) / (2 * settings.blur**2)), 0)
+    offset = (np.array([*pose[:2], turn]) - guess) / sigma
+    return scores.sum() - (offset**2).sum() / 2
+
+
+@pytest.mark.parametrize("ranges", [np.full(180, np.nan), np.where(np.arange(180) == 3, 2.0, np.nan)])
+def test_a_scan_without_surfaces_has_no_patches_and_stays_at_the_guess(ranges):
+    rng = np.random.default_rng(6)
+    map = map_of([sick_scan(ROOM, random_pose(ROOM, rng), NOISE, rng)])
+    seen = patches(Scan(ranges, np.deg2rad(np.arange(-90.0, 90))), MATCH)
+    guess = np.array([0.1, 0.2, 0.3])
+    laid = lay(map, seen, guess, guess, np.eye(3), MATCH.reach)
+    assert len(seen.means) == 0
+    assert laid.inliers == 0
+    np.testing.assert_allclose(laid.pose, guess, atol=1e-9)
+    np.testing.assert_allclose(laid.information, np.eye(3), atol=1e-9)

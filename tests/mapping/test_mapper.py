@@ -1,0 +1,138 @@
+"""The mapper around a simulated building, with odometry whose noise is known, and without any."""
+
+import threading
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from mapping_scenes import SETTINGS, drive, full_scan, way
+
+from lidarcore.errors import MotionError
+from lidarcore.geometry import pose_difference, relative
+from lidarcore.mapping import Mapper
+
+
+def mapped(scans):
+    """A finished mapper, and the placements on the way."""
+    mapper = Mapper(SETTINGS)
+    placements = [mapper.step(scan) for scan in scans]
+    mapper.finish()
+    return mapper, placements
+
+
+def errors(poses, scans):
+    """(T, 3) of poses that begin where the true ones do."""
+    return pose_difference(poses, np.array([scan.truth for scan in scans]))
+
+
+def test_a_loop_around_a_building_closes_where_odometry_drifts():
+    for seed in range(3):
+        scans = drive(way(0.5, 1.3), np.random.default_rng(seed))
+        mapper, placements = mapped(scans)
+        assert all(placement.connected for placement in placements)
+        off = errors(mapper.trajectory()[1], scans)
+        assert np.hypot(off[:, 0], off[:, 1]).max() < 0.2
+        assert len(mapper.loops) > 3
+        numbers = mapper.keyframes.numbers
+        for loop in mapper.loops:
+            true = relative(scans[numbers[loop.i]].truth, scans[numbers[loop.j]].truth)
+            assert np.hypot(*pose_difference(loop.pose, true)[:2]) < 0.2
+        odometry = relative(scans[0].odometry, np.array([scan.odometry for scan in scans]))
+        assert np.hypot(*errors(odometry, scans)[-1, :2]) > 0.3
+
+
+def test_without_odometry_the_motion_is_taken_to_go_on():
+    scans = drive(way(0.1, 0.5), np.random.default_rng(3), full_scan, odometry=False)
+    mapper, placements = mapped(scans)
+    assert all(placement.connected for placement in placements)
+    assert np.abs(errors(mapper.trajectory()[1], scans)[:, :2]).max() < 0.1
+    assert len(mapper.keyframes.scans) < len(scans) / 2
+
+
+def test_scans_between_keyframes_make_none():
+    scan = drive(way(0.5, 0.1), np.random.default_rng(4))[0]
+    mapper, placements = mapped([replace(scan, stamp=float(k)) for k in range(20)])
+    assert len(mapper.keyframes.scans) == 1
+    assert np.abs(placements[-1].pose).max() < 0.01
+
+
+def test_a_blind_scan_hangs_on_odometry_and_the_next_one_finds_back():
+    scans = drive(way(0.5, 0.4), np.random.default_rng(5))
+    scans[12] = replace(scans[12], ranges=np.full(180, np.nan))
+    mapper, placements = mapped(scans)
+    assert [k for k, placement in enumerate(placements) if not placement.connected] == [12]
+    off = errors(mapper.trajectory()[1], scans)
+    assert np.hypot(off[-1, 0], off[-1, 1]) < 0.1
+
+
+def test_wheels_that_slip_are_not_believed_against_the_walls():
+    """Odometry claims 0.3 m more between two scans than was driven: the walls say otherwise."""
+    scans = drive(way(0.5, 0.6), np.random.default_rng(8))
+    slipped = [
+        replace(scan, odometry=scan.odometry + np.array([0.3, 0, 0])) if k >= 10 else scan
+        for k, scan in enumerate(scans)
+    ]
+    mapper, _ = mapped(slipped)
+    assert np.abs(errors(mapper.trajectory()[1], scans)[:, :2]).max() < 0.2
+
+
+def test_bad_motion_is_told_and_leaves_everything_as_it_was():
+    scans = drive(way(0.5, 0.1), np.random.default_rng(6))
+    mapper = Mapper(SETTINGS)
+    for scan in scans[:4]:
+        mapper.step(scan)
+    stamps, poses = mapper.trajectory()
+    with pytest.raises(MotionError, match="clock went back"):
+        mapper.step(replace(scans[4], stamp=1.0))
+    with pytest.raises(MotionError, match="jumped"):
+        mapper.step(replace(scans[4], odometry=scans[4].odometry + np.array([100.0, 0, 0])))
+    np.testing.assert_array_equal(mapper.trajectory()[1], poses)
+    mapper.step(scans[4])
+    assert len(mapper.trajectory()[0]) == len(stamps) + 1
+
+
+def test_the_trajectory_has_every_scan_with_its_stamp():
+    scans = drive(way(0.5, 0.2), np.random.default_rng(7))
+    mapper = Mapper(SETTINGS)
+    stamps, poses = mapper.trajectory()
+    assert stamps.shape == (0,)
+    assert poses.shape == (0, 3)
+    for scan in scans:
+        placement = mapper.step(scan)
+    stamps, poses = mapper.trajectory()
+    assert all(b > a for a, b in pairwise(stamps))
+    np.testing.assert_allclose(poses[-1], placement.pose)
+    assert np.linalg.eigvalsh(mapper.covariances()[1:]).min() > 0
+
+
+def test_in_the_background_the_map_becomes_the_same_and_the_thread_ends():
+    scans = drive(way(0.5, 1.1), np.random.default_rng(9))
+    alone, _ = mapped(scans)
+    before = threading.active_count()
+    with Mapper(SETTINGS, background=True) as mapper:
+        placements = [mapper.step(scan) for scan in scans]
+        assert threading.active_count() == before + 1
+        mapper.finish()
+    assert threading.active_count() == before
+    assert [placement.connected for placement in placements] == [True] * len(scans)
+    np.testing.assert_allclose(mapper.trajectory()[1], alone.trajectory()[1], atol=0.02)
+    assert len(mapper.keyframes.scans) == len(alone.keyframes.scans)
+
+
+def test_what_ends_the_thread_is_told_to_whoever_brings_scans(monkeypatch):
+    scans = drive(way(0.5, 0.2), np.random.default_rng(10))
+
+    def broken(*_):
+        raise ZeroDivisionError
+
+    def go_on():
+        for scan in scans[1:4]:
+            mapper.step(scan)
+        mapper.finish()
+
+    with Mapper(SETTINGS, background=True) as mapper:
+        mapper.step(scans[0])
+        monkeypatch.setattr("lidarcore.mapping.back.compose", broken)
+        with pytest.raises(ZeroDivisionError):
+            go_on()

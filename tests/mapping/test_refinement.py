@@ -1,0 +1,102 @@
+"""The adjustment of all keyframes, against dense algebra written otherwise, and its claims against known truth."""
+
+import numpy as np
+import pytest
+from mapping_scenes import NOISE, full_scan
+from scipy.stats import chi2
+
+from lidarcore.geometry import act, compose, pose_difference, relative
+from lidarcore.mapping import MatchSettings
+from lidarcore.mapping.adjustment import Sightings, normal_equations
+from lidarcore.mapping.patches import patches
+from lidarcore.mapping.refinement import Step, refine
+from lidarcore.simulation import World, furnished_room
+from lidarcore.simulation.rooms import rectangular_room
+
+MATCH = MatchSettings(noise=NOISE, unevenness=0)
+VAGUE = np.diag([0.1, 0.1, 0.05]) ** 2
+
+
+def seen_from(world: World, poses, rng):
+    return [patches(full_scan(world, pose, NOISE, rng), MATCH) for pose in poses]
+
+
+def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_eliminated():
+    """Three keyframes see one wall in one cell: the dense problem has 9 + 2 unknowns."""
+    rng = np.random.default_rng(1)
+    poses = np.array([[0, 0, 0.1], [0.1, 0.2, -0.2], [-0.1, 0.1, 0.3]])
+    keyframes = np.repeat(np.arange(3), 3)
+    t = rng.uniform(0.05, 0.45, 9)
+    world = np.stack([t, 5.2 + rng.normal(0, 0.001, 9)], -1)
+    means = np.array(
+        [act(compose(np.zeros(3), _inverse(poses[k])), p) for k, p in zip(keyframes, world, strict=True)]
+    )
+    normals = np.array([act(np.array([0, 0, -poses[k, 2]]), np.array([0.0, -1.0])) for k in keyframes])
+    variances = rng.uniform(0.5, 2, 9) * 1e-4
+    seen = Sightings(keyframes, means, normals, variances)
+    sums, cells = normal_equations(seen, poses, 0.5, 2.0, 0.003)
+    assert cells == 1
+    weights = 1 / (2 * variances + 3 * 0.003**2)
+    middle = world.mean(axis=0)
+
+    def residuals(x):
+        placed = np.array([act(x[3 * k : 3 * k + 3], m) for k, m in zip(keyframes, means, strict=True)])
+        r = -(placed - middle)[:, 1] - x[9] - x[10] * t0
+        return np.append(np.sqrt(weights) * r, x[10] / 0.1)
+
+    t0 = (world - middle)[:, 0]  # along the normal (0, -1), t is x
+    x0 = np.append(poses.ravel(), [0.0, 0.0])
+    J = np.stack([(residuals(x0 + d) - residuals(x0 - d)) / 2e-6 for d in 1e-6 * np.eye(11)], -1)
+    H, g = J.T @ J, J.T @ residuals(x0)
+    schur = H[:9, :9] - H[:9, 9:] @ np.linalg.solve(H[9:, 9:], H[9:, :9])
+    rest = g[:9] - H[:9, 9:] @ np.linalg.solve(H[9:, 9:], g[9:])
+    np.testing.assert_allclose(sums.information.toarray(), schur, rtol=1e-5, atol=1e-2)
+    np.testing.assert_allclose(sums.gradient, rest, rtol=1e-5, atol=1e-3)
+
+
+def _inverse(pose):
+    return relative(pose, np.zeros(3))
+
+
+def runs(world, poses, number, first=0):
+    """Normalised errors (number, 3 pairs) of relative poses from refined maps of a way, begun a little off."""
+    nees = []
+    for seed in range(first, first + number):
+        rng = np.random.default_rng(seed)
+        scans = seen_from(world, poses, rng)
+        driven = relative(poses[:-1], poses[1:]) + rng.multivariate_normal(
+            np.zeros(3), VAGUE / 25, len(poses) - 1
+        )
+        steps = [Step(k, k + 1, z, VAGUE / 25) for k, z in enumerate(driven)]
+        start = relative(poses[0], poses) + rng.normal(0, [0.02, 0.02, 0.005], (len(poses), 3))
+        start[0] = 0
+        refined = refine(scans, start, steps, 0.5)
+        row = []
+        for i, j in ((0, 1), (0, len(poses) - 1), (len(poses) // 2, len(poses) - 1)):
+            found = refined.relative(i, j)
+            off = pose_difference(found.pose, relative(poses[i], poses[j]))
+            row.append(off @ np.linalg.solve(found.covariance, off))
+        nees.append(row)
+    return np.array(nees)
+
+
+ROOM_WAY = np.array([[3 + 0.35 * k, 3 + 0.1 * k, 0.2 * k] for k in range(8)])
+HALL_WAY = np.array([[-3.0 + 0.8 * k, 0.3 * k, 0.1 * k] for k in range(8)])
+CORRIDOR_WAY = np.array([[-1.5 + 0.4 * k, 0.05 * k, 0.02 * k] for k in range(8)])
+
+
+@pytest.mark.parametrize(
+    ("world", "poses"),
+    [
+        (furnished_room(), ROOM_WAY),
+        (rectangular_room(20, 14), HALL_WAY),
+        (rectangular_room(60, 2.4), CORRIDOR_WAY),
+    ],
+    ids=["room", "hall", "corridor"],
+)
+def test_relative_poses_are_as_far_off_as_they_claim(world, poses):
+    """NEES of 40 runs: its mean lies where chi-square would in all but one of a million runs, give or take 15 %."""
+    nees = runs(world, poses, 40)
+    low, high = (chi2.ppf(p, 3 * len(nees)) / len(nees) for p in (5e-7, 1 - 5e-7))
+    for column in nees.T:
+        assert 0.85 * low < column.mean() < 1.15 * high

@@ -1,0 +1,140 @@
+"""Poses found in a known map: branch and bound against brute force, simulated rooms, and a mirror that fools nobody."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from lidarcore import Scan, SensorNoise
+from lidarcore.errors import LocalizationError
+from lidarcore.geometry import compose, pose_difference
+from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, write_ros_map
+from lidarcore.mapping.relocation import Relocator, query_of
+from lidarcore.mapping.relocation.field import FULL, make_field
+from lidarcore.mapping.relocation.search import best_pose, fit_at, top_nodes
+from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
+from lidarcore.simulation.rooms import rectangular_room
+
+NOISE = SensorNoise(0.01, 0.001)
+
+
+def scan_at(world: World, pose: np.ndarray, seed: int = 0) -> Scan:
+    return SimulatedSensor(world, NOISE).scan(pose, np.random.default_rng(seed))[0]
+
+
+def mapped(world: World, count: int = 40) -> OccupancyGrid:
+    rng = np.random.default_rng(3)
+    poses = np.array([random_pose(world, rng) for _ in range(count)])
+    return build_grid([scan_at(world, pose, k) for k, pose in enumerate(poses)], poses)
+
+
+@cache
+def furnished() -> OccupancyGrid:
+    return mapped(furnished_room())
+
+
+def test_branch_and_bound_finds_what_brute_force_finds():
+    rng = np.random.default_rng(1)
+    for _ in range(5):
+        cells = rng.choice([-1, 0, 100], (60, 75), p=[0.3, 0.62, 0.08]).astype(np.int8)
+        field = make_field(OccupancyGrid(cells, 0.05, np.zeros(3)), 0.1)
+        columns = rng.integers(-25, 25, (7, 30)).astype(np.int32)
+        rows = rng.integers(-25, 25, (7, 30)).astype(np.int32)
+        fits = {
+            (a, x, y): fit_at(field.levels[0], columns[a], rows[a], x, y, 0)
+            for a in range(7)
+            for y, x in np.argwhere(field.room[0] > 0).tolist()
+        }
+        best = max(fits.values())
+        nodes, bounds = top_nodes(field.levels, field.room, columns, rows, 0)
+        order = np.argsort(-bounds, kind="stable")
+        none = np.empty((0, 3), np.int32)
+        fit, *place = best_pose(
+            field.levels, field.room, columns, rows, nodes, bounds, order, 1, none, (0, 0)
+        )
+        assert fit == best == fits[tuple(place)]
+        # And the best of the rest, if all within eight cells at angles next to it do not count.
+        taken, apart = np.array([place], np.int32), (1, 8)
+        rest = max(
+            value
+            for (a, x, y), value in fits.items()
+            if min((a - place[0]) % 7, (place[0] - a) % 7) > 1 or np.hypot(x - place[1], y - place[2]) > 8
+        )
+        assert (
+            best_pose(field.levels, field.room, columns, rows, nodes, bounds, order, 1, taken, apart)[0]
+            == rest
+        )
+        nothing = best_pose(
+            field.levels, field.room, columns, rows, nodes, bounds, order, best + 1, none, (0, 0)
+        )
+        assert nothing[0] == -1
+
+
+def test_the_fit_of_a_point_falls_with_its_distance_from_what_stands():
+    cells = np.zeros((40, 40), np.int8)
+    cells[20, 20] = 100
+    field = make_field(OccupancyGrid(cells, 0.05, np.zeros(3)), 0.1)
+    row, column = 20 - field.corner[1], 20 - field.corner[0]
+    assert field.levels[0][row, column] == FULL
+    assert field.levels[0][row, column + 2] == pytest.approx(FULL * np.exp(-0.5), abs=1)
+    assert field.levels[3][row - 7, column - 7] == FULL
+    assert field.levels[3][row + 1, column] < FULL
+
+
+def test_poses_in_a_furnished_room_are_found_from_one_scan():
+    rng, relocator = np.random.default_rng(7), Relocator(furnished())
+    errors, claims = [], []
+    for k in range(25):
+        pose = random_pose(furnished_room(), rng)
+        found = relocator.find(query_of([scan_at(furnished_room(), pose, 100 + k)]))
+        if found.found:
+            errors.append(pose_difference(found.pose, pose))
+            claims.append(np.sqrt(np.diag(found.covariance)))
+    assert len(errors) >= 20
+    assert np.hypot(*np.array(errors)[:, :2].T).max() < 0.1
+    assert np.abs(np.array(errors)[:, 2]).max() < 0.03
+    assert (np.abs(errors) < 3 * np.array(claims)).mean() > 0.95
+
+
+def test_maps_that_ros_placed_and_turned_are_searched_in_their_world(tmp_path):
+    own = furnished()
+    shift = np.array([12.0, -7.0, 0.6])
+    write_ros_map(OccupancyGrid(own.cells, own.resolution, compose(shift, own.origin)), tmp_path / "m.yaml")
+    relocator = Relocator(read_ros_map(tmp_path / "m.yaml"))
+    pose = np.array([7.6, 4.4, 1.0])
+    found = relocator.find(query_of([scan_at(furnished_room(), pose)]))
+    assert found.found
+    assert np.abs(pose_difference(found.pose, compose(shift, pose))).max() < 0.08
+
+
+def test_two_places_that_look_alike_are_none():
+    """A rectangle looks the same from the opposite pose."""
+    room = rectangular_room(6, 4)
+    found = Relocator(mapped(room)).find(query_of([scan_at(room, np.array([1.2, 0.5, 0.3]))]))
+    assert found.verdict == "several places"
+    assert found.rival > 0.85 * found.fit
+
+
+def test_other_rooms_are_not_found():
+    rng, relocator = np.random.default_rng(8), Relocator(furnished())
+    other = World(np.concatenate([rectangular_room(7, 5).walls, [[[-1.0, -2.5], [-1.0, 0.4]]]]))
+    for k in range(10):
+        assert not relocator.find(query_of([scan_at(other, random_pose(other, rng), k)])).found
+
+
+def test_keyframes_together_are_laid_as_they_lie_to_each_other():
+    room = furnished_room()
+    poses = np.array([[7.6, 4.4, 0.0], [7.0, 4.3, 0.5], [6.4, 4.2, 1.0]])
+    scans = [scan_at(room, pose, k) for k, pose in enumerate(poses)]
+    elsewhere = np.array([compose(np.array([3.0, 9.0, -1.0]), pose) for pose in poses])
+    found = Relocator(furnished()).find(query_of(scans, elsewhere))
+    assert found.found
+    assert np.abs(pose_difference(found.pose, poses[-1])).max() < 0.08
+
+
+def test_too_few_points_and_empty_maps_say_so():
+    assert Relocator(furnished()).find(query_of([Scan([1.0, 2.0], [0.0, 1.0])])).verdict == "too few points"
+    with pytest.raises(LocalizationError, match="occupied"):
+        Relocator(OccupancyGrid(np.zeros((5, 5)), 0.05, np.zeros(3)))
+    with pytest.raises(LocalizationError):
+        query_of([])

@@ -1,0 +1,57 @@
+"""SLAM from whole scans while it runs: a simulated robot that knows its true poses."""
+
+from collections.abc import Iterator
+from itertools import islice
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from waiting import wait_until
+
+from lidarcore.geometry import relative, wrap
+from lidarcore.localization import TrackingResult
+from lidarcore.mapping import WholeScans
+from lidarcore.scan import Array, Scan
+from lidarcore.simulation.robot import SimulatedRobot
+from lidarcore.simulation.settings import SimulationSettings
+
+SCANS = 400  # 40 s, more than one round
+
+
+@pytest.fixture(scope="module")
+def drive() -> list[Scan]:
+    settings = SimulationSettings(world="two rooms", seed=5)
+    return list(islice(SimulatedRobot(settings), SCANS))
+
+
+@pytest.fixture
+def slam() -> Iterator[WholeScans]:
+    running = WholeScans()
+    yield running
+    running.close()
+
+
+def followed(slam: WholeScans, scans: list[Scan]) -> list[TrackingResult]:
+    return [slam.step(slam.deskewed(scan)) for scan in scans]
+
+
+def true_pose(scans: list[Scan], k: int) -> Array:
+    """In the frame of the map, which begins where the first scan was taken."""
+    first, then = scans[0].truth, scans[k].truth
+    assert first is not None
+    assert then is not None
+    return relative(first, then)
+
+
+def test_a_robot_that_drives_through_two_rooms_is_tracked_all_the_way(
+    slam: WholeScans, drive: list[Scan]
+) -> None:
+    results = followed(slam, drive)
+    assert {result.state for result in results} == {"tracking"}
+    wait_until(lambda: not slam.is_behind)
+    last = slam.step(slam.deskewed(drive[-1])).estimate
+    error = last.pose - true_pose(drive, -1)
+    error[2] = wrap(error[2])
+    print(error, np.sqrt(np.diag(last.covariance)))
+    assert np.hypot(*error[:2]) < 0.1
+    assert error @ np.linalg.solve(last.covariance, error) < chi2.isf(1e-6, 3)
