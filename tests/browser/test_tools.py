@@ -1,6 +1,7 @@
 """Tools of the view that belong to this browser: the sensor in the middle, its heading up, and scans that fade."""
 
 from collections.abc import Callable
+from itertools import pairwise
 from math import atan2, cos, hypot, sin
 
 import numpy as np
@@ -121,5 +122,5 @@ def test_points_of_the_last_scans_fade_out(visit: Callable[..., Visitor]) -> Non
     only_first = (np.abs(first - ground).sum(axis=2) > 200) & (np.abs(bare - ground).sum(axis=2) == 0)
     assert only_first.sum() > 100
     strengths = [strength(picture) for picture in (first, *others)]
-    assert all(now < before for before, now in zip(strengths, strengths[1:], strict=False)), strengths
+    assert all(now < before for before, now in pairwise(strengths)), strengths
     assert strength(bare) == 0
