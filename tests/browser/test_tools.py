@@ -16,11 +16,13 @@ MOVED = 0.3  # m
 MIDDLE = "Keep the sensor in the middle"
 HEADING = "The sensor's heading up"
 SENSOR = """async () => {
-  const [{ lookNow }, { get }] = await Promise.all(["scene.js", "store.js"].map((name) => import(`/static/js/${name}`)));
+  const { lookNow } = await import("/static/js/scene.js");
+  const { get } = await import("/static/js/store.js");
   const { x, y, heading } = get("frame").localization?.pose ?? { x: 0, y: 0, heading: 0 };
   const look = lookNow();
   const ahead = [x + 0.5 * Math.cos(heading), y + 0.5 * Math.sin(heading)];
-  return { pose: [x, y, heading], at: look.toScreen([x, y]), ahead: look.toScreen(ahead), size: [look.width, look.height] };
+  const [at, above] = [[x, y], ahead].map((place) => look.toScreen(place));
+  return { pose: [x, y, heading], at, ahead: above, size: [look.width, look.height] };
 }"""
 ALONE = {"points": True} | dict.fromkeys(
     ("segments", "corners", "ellipses", "clusters", "rejected", "grid", "sensor", "gaps"), False
