@@ -3,13 +3,17 @@
 
 import { $ } from "./dom.js";
 import { setting, toggleSetting } from "./actions.js";
+import { Fading } from "./overlay/fading.js";
+import { framingOf } from "./overlay/framing.js";
 import { Look, PlainCamera } from "./overlay/look.js";
+import { letGo } from "./overlay/tools.js";
 import { get, on } from "./store.js";
 
 /** What the scene's frame offers, once it has started. */
 export const view = () => $("scene").contentWindow?.lidarView;
 
 const plain = new PlainCamera($("stage"));
+const fading = new Fading(() => get("tools").fade);
 
 /** How the floor is seen now. */
 export function lookNow() {
@@ -28,36 +32,45 @@ export const onSceneMessage = (type, run) => handlers.set(type, run);
 /** `press(event)` receives the keys pressed in the scene. */
 export function mountScene(press) {
   onSceneMessage("keydown", press);
+  onSceneMessage("dragged", letGo);
   $("fit").addEventListener("click", () => fitScene());
   $("rotate").addEventListener("click", () => toggleSetting("view.rotate"));
-  $("scene").addEventListener("load", () => {
-    applyRotation();
-    hideLayers();
-    if (get("frame")) follow(get("frame"));
-  });
+  $("scene").addEventListener("load", begin);
+  begin();
   on(["settings"], () => {
     applyRotation();
     hideLayers();
   });
-  on(["frame"], (frame) => {
-    $("stage").classList.remove("waiting");
-    follow(frame);
-  });
+  on(["frame"], () => $("stage").classList.remove("waiting"));
+  on(["frame", "tools"], look);
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
     if (ours) handlers.get(data?.type)?.(data);
   });
 }
 
-function follow({ extent }) {
-  plain.follow(extent);
-  view()?.follow(extent);
+/** With what the scene's frame has to know from its start. */
+function begin() {
+  applyRotation();
+  hideLayers();
+  view()?.onTick((scene) => fading.tick(scene));
+  look();
 }
+
+function look() {
+  const framing = framed(get("frame"));
+  if (!framing) return;
+  plain.look(framing);
+  view()?.look(framing);
+}
+
+const framed = (frame) => frame && framingOf(frame.extent, frame.localization?.pose, get("tools"));
 
 /** Fits the room of a frame, else of the newest one, in the view. */
 export function fitScene(frame = get("frame")) {
-  plain.fit(frame?.extent);
-  view()?.fit(frame?.extent);
+  const framing = framed(frame);
+  plain.fit(framing);
+  view()?.fit(framing);
 }
 
 function applyRotation() {
