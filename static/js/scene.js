@@ -4,7 +4,7 @@
 import { $ } from "./dom.js";
 import { setting, toggleSetting } from "./actions.js";
 import { Fading } from "./overlay/fading.js";
-import { framingOf } from "./overlay/framing.js";
+import { framingOf, isFramed } from "./overlay/framing.js";
 import { Look, PlainCamera } from "./overlay/look.js";
 import { letGo } from "./overlay/tools.js";
 import { get, on } from "./store.js";
@@ -12,6 +12,8 @@ import { get, on } from "./store.js";
 /** What the scene's frame offers, once it has started. */
 export const view = () => $("scene").contentWindow?.lidarView;
 
+const NUMBERS_PX = 20; // of the grid, below
+const narrow = matchMedia("(max-width: 899px)");
 const plain = new PlainCamera($("stage"));
 const fading = new Fading(() => get("tools").fade);
 
@@ -64,7 +66,22 @@ function look() {
   view()?.look(framing);
 }
 
-const framed = (frame) => frame && framingOf(frame.extent, frame.localization?.pose, get("tools"));
+function framed(frame) {
+  if (!frame) return undefined;
+  const sheet = sheetNow();
+  const framing = framingOf(frame.extent, frame.localization?.pose, get("tools"), sheet);
+  return { ...framing, isFramed: isFramed(frame.extent, lookNow(), sheet) };
+}
+
+/** The size of the view, and how much of its edges is taken, in pixels; on a narrow page that would leave too little. */
+function sheetNow() {
+  const { clientWidth: width, clientHeight: height } = $("stage");
+  if (narrow.matches) return { width, height, left: 0, right: 0, top: 0, bottom: NUMBERS_PX };
+  const [legend, tools, strip] = [$("legend"), $("scene-tools"), $("welcome")];
+  const left = legend.open ? legend.offsetLeft + legend.offsetWidth : 0;
+  const top = strip ? strip.offsetTop + strip.offsetHeight : 0;
+  return { width, height, left, right: width - tools.offsetLeft, top, bottom: NUMBERS_PX };
+}
 
 /** Fits the room of a frame, else of the newest one, in the view. */
 export function fitScene(frame = get("frame")) {
