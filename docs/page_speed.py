@@ -21,12 +21,11 @@ VISITS = 5
 SECONDS = 20.0
 SAMPLING = 200  # µs
 OURS = ("/static/js/", "/static/viser_bridge.js")
-# When the first frame was drawn, ms since the page was asked for; then how old each frame was when it was drawn.
+# When the first frame was drawn, ms since the page was asked for; then how old each was when it was sent and drawn.
 WATCH = """
   const first = () => {
-    const stage = document.querySelector("#stage");
-    if (stage && !stage.classList.contains("waiting")) requestAnimationFrame((now) => (window.firstDrawn = now));
-    else requestAnimationFrame(first);
+    const isThere = document.querySelector("#readout-frame")?.textContent > 0;
+    requestAnimationFrame(isThere ? (now) => (window.firstDrawn = now) : first);
   };
   requestAnimationFrame(first);
   window.ages = [];
@@ -37,7 +36,8 @@ WATCH = """
       this.addEventListener("message", ({ data }) => {
         const message = JSON.parse(data);
         const received = performance.now();
-        const age = () => window.ages.push(message.timings.age_ms + performance.now() - received);
+        const sent = message.timings?.age_ms;
+        const age = () => window.ages.push([sent, sent + performance.now() - received]);
         if (message.type === "frame") requestAnimationFrame(() => requestAnimationFrame(age));
       });
     }
@@ -77,7 +77,7 @@ def _visit(browser: Browser, url: str) -> Page:
     page = browser.new_context(viewport={"width": 1400, "height": 900}).new_page()
     page.add_init_script(f"localStorage.setItem('welcomed', 'yes'); if (window === top) {{ {WATCH} }}")
     page.goto(url)
-    page.wait_for_function("window.firstDrawn")
+    page.wait_for_function("() => window.firstDrawn")
     return page
 
 
@@ -117,7 +117,8 @@ def _tell(page: Page, session: CDPSession) -> None:
     ages = page.evaluate("window.ages")
     script, costs = _own_work(session.send("Profiler.stop")["profile"])
     frames = len(ages)
-    print(f"    {frames / SECONDS:.1f} frames a second, {_spread(ages)} ms old when drawn")
+    sent, drawn = (_spread(list(part)) for part in zip(*ages, strict=True))
+    print(f"    {frames / SECONDS:.1f} frames a second, when sent {sent} ms old, when drawn {drawn}")
     print(f"    own work: {script / 1e3 / frames:.1f} ms of script a frame, of which")
     for name, spent in sorted(costs.items(), key=lambda cost: -cost[1])[:8]:
         print(f"      {spent / 1e3 / frames:.2f} ms {name}")

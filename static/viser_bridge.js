@@ -144,10 +144,18 @@
     return { type: "pose", x, y, heading: Math.atan2(toY - y, toX - x) };
   }
 
+  let box = null; // of the canvas in the window; to measure it at every look would take longer than all the rest
+
+  function canvasBox() {
+    const canvas = document.querySelector("canvas");
+    if (!box) new ResizeObserver(() => (box = canvas.getBoundingClientRect())).observe(canvas);
+    return (box ??= canvas.getBoundingClientRect());
+  }
+
   /** Where the ray through a point of the window meets the floor. */
   function floorAt({ clientX, clientY }) {
     const eye = camera().position;
-    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    const { left, top, width, height } = canvasBox();
     const [right, up] = [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
     const beam = eye.clone().set(right, up, 0.5).unproject(camera()).sub(eye);
     return onFloor(eye.clone().addScaledVector(beam, -eye.y / beam.y));
@@ -202,7 +210,7 @@
   /** The homography from the floor (x, y, 1) to pixels of the window, row by row; null until there is a view. */
   function floorToWindow() {
     if (!controls() || !camera()) return null;
-    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    const { left, top, width, height } = canvasBox();
     camera().updateMatrixWorld();
     const m = camera().projectionMatrix.clone().multiply(camera().matrixWorldInverse).elements;
     const [right, up, , depth] = [0, 1, 2, 3].map((i) => [-m[8 + i], -m[i], m[12 + i]]); // of x, y and 1

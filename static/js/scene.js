@@ -14,13 +14,13 @@ export const view = () => $("scene").contentWindow?.lidarView;
 
 const NUMBERS_PX = 20; // of the grid, below
 const narrow = matchMedia("(max-width: 899px)");
-const plain = new PlainCamera($("stage"));
+const plain = new PlainCamera(() => sheetNow());
 const fading = new Fading(() => get("tools").fade);
 
 /** How the floor is seen now. */
 export function lookNow() {
-  const { clientWidth, clientHeight } = $("stage");
-  return new Look(view()?.floorToWindow() ?? plain.floorToWindow(), clientWidth, clientHeight);
+  const { width, height } = sheetNow();
+  return new Look(view()?.floorToWindow() ?? plain.floorToWindow(), width, height);
 }
 
 /** The camera that the pointer moves over a scene that has none; else null. */
@@ -38,12 +38,15 @@ export function mountScene(press) {
   $("fit").addEventListener("click", () => fitScene());
   $("rotate").addEventListener("click", () => toggleSetting("view.rotate"));
   $("scene").addEventListener("load", begin);
-  begin();
+  watchSheet();
   on(["settings"], () => {
     applyRotation();
     hideLayers();
   });
-  on(["frame"], () => $("stage").classList.remove("waiting"));
+  const stop = on(["frame"], () => {
+    requestAnimationFrame(() => setTimeout(() => ($("scene").src = "viser/")));
+    stop();
+  });
   on(["frame", "tools"], look);
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
@@ -51,8 +54,9 @@ export function mountScene(press) {
   });
 }
 
-/** With what the scene's frame has to know from its start. */
+/** With what the scene's frame has to know from its start. It takes long, so the first frame is drawn without it. */
 function begin() {
+  $("stage").classList.remove("waiting");
   applyRotation();
   hideLayers();
   view()?.onTick((scene) => fading.tick(scene));
@@ -68,13 +72,24 @@ function look() {
 
 function framed(frame) {
   if (!frame) return undefined;
-  const sheet = sheetNow();
-  const framing = framingOf(frame.extent, frame.localization?.pose, get("tools"), sheet);
-  return { ...framing, isFramed: isFramed(frame.extent, lookNow(), sheet) };
+  const framing = framingOf(frame.extent, frame.localization?.pose, get("tools"), sheetNow());
+  return { ...framing, isFramed: isFramed(frame.extent, lookNow(), sheetNow()) };
+}
+
+let sheet = null; // as it was measured last
+
+const sheetNow = () => (sheet ??= measuredSheet());
+
+/** To be measured anew when something over the view comes, goes or changes its size: to measure takes time. */
+function watchSheet() {
+  const forget = () => (sheet = null);
+  const sizes = new ResizeObserver(forget);
+  for (const id of ["stage", "legend"]) sizes.observe($(id));
+  new MutationObserver(forget).observe($("stage"), { childList: true });
 }
 
 /** The size of the view, and how much of its edges is taken, in pixels; on a narrow page that would leave too little. */
-function sheetNow() {
+function measuredSheet() {
   const { clientWidth: width, clientHeight: height } = $("stage");
   if (narrow.matches) return { width, height, left: 0, right: 0, top: 0, bottom: NUMBERS_PX };
   const [legend, tools, strip] = [$("legend"), $("scene-tools"), $("welcome")];

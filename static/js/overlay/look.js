@@ -56,8 +56,9 @@ export class PlainCamera {
   #held = null; // {middle, scale} as someone moved it; null while all is kept in the view
   #wanted = { middle: [0, 0], half: 5, up: Math.PI / 2 }; // as framing.js has it
 
-  constructor(stage) {
-    this.stage = stage;
+  /** `size()` tells the view's {width, height} in pixels. */
+  constructor(size) {
+    this.size = size;
   }
 
   fit(framing) {
@@ -71,7 +72,7 @@ export class PlainCamera {
   }
 
   floorToWindow() {
-    const { clientWidth: width, clientHeight: height } = this.stage;
+    const { width, height } = this.size();
     const { middle, scale, axes: [right, up] } = this.#state();
     return [
       ...right.map((part) => scale * part), width / 2 - scale * along(right, middle),
@@ -87,7 +88,7 @@ export class PlainCamera {
 
   /** Enlarges what is seen; the pixel given stays where it is. */
   zoom([X, Y], factor) {
-    const { clientWidth: width, clientHeight: height } = this.stage;
+    const { width, height } = this.size();
     const [right, up] = [X - width / 2, height / 2 - Y].map((way) => way * (1 - 1 / factor));
     this.#move(right, up, factor);
   }
@@ -101,7 +102,7 @@ export class PlainCamera {
 
   #state() {
     const { middle, half, up } = this.#wanted;
-    const held = this.#held ?? { middle, scale: this.stage.clientHeight / (2 * half) };
+    const held = this.#held ?? { middle, scale: this.size().height / (2 * half) };
     return { ...held, axes: axesAt(up) };
   }
 }
