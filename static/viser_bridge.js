@@ -5,9 +5,6 @@
 
 (() => {
   "use strict";
-  const MARGIN = 1.08; // around the room when it is looked at,
-  const EDGE = 1.02; // and what has to be left of it
-  const SMALL = 0.6; // of the view: a room that fills less than this is looked at again
   const CLICK_PX = 4; // a pointer that moves less while it is pressed
   const SHORT_DRAG = 12; // px; shorter ones have no direction
   const POINT_PX = 3; // of the measured points, at every zoom
@@ -85,26 +82,15 @@
     await ready;
     if (placing || document.hidden) return;
     turn();
-    if (wanted.isFollowed) controls().moveTo(...inThree(...wanted.centre, 0), false);
-    if (!moved && !rotating && !isInView()) lookDown();
+    if (wanted.isFollowed) controls().moveTo(...inThree(...wanted.middle, 0), false);
+    if (!moved && !rotating && !wanted.isFramed) lookDown();
   }
 
   function lookDown() {
-    const { centre: [x, y], halves: [half, halfUp], up } = wanted;
-    const height = (MARGIN * Math.max(halfUp, half / camera().aspect)) / slope();
+    const { middle: [x, y], half, up } = wanted;
+    const height = half / slope();
     const [back, aside] = [1e-5 * height * Math.cos(up), 1e-5 * height * Math.sin(up)];
     controls().setLookAt(...inThree(x - back, y - aside, height), ...inThree(x, y, 0), true);
-  }
-
-  function isInView() {
-    const { centre, halves: wide, up } = wanted;
-    const [x, y] = onFloor(controls().getTarget()).map((at, axis) => centre[axis] - at);
-    const [c, s] = [Math.cos(up), Math.sin(up)];
-    const off = [s * x - c * y, c * x + s * y]; // to the right and up
-    const half = controls().distance * slope();
-    const halves = [half * camera().aspect, half];
-    const inside = wide.every((own, i) => Math.abs(off[i]) + EDGE * own < halves[i]);
-    return inside && wide.some((own, i) => own > SMALL * halves[i]);
   }
 
   /** Whether the next drag says where the sensor is and where it looks. */
@@ -158,10 +144,18 @@
     return { type: "pose", x, y, heading: Math.atan2(toY - y, toX - x) };
   }
 
+  let box = null; // of the canvas in the window; to measure it at every look would take longer than all the rest
+
+  function canvasBox() {
+    const canvas = document.querySelector("canvas");
+    if (!box) new ResizeObserver(() => (box = canvas.getBoundingClientRect())).observe(canvas);
+    return (box ??= canvas.getBoundingClientRect());
+  }
+
   /** Where the ray through a point of the window meets the floor. */
   function floorAt({ clientX, clientY }) {
     const eye = camera().position;
-    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    const { left, top, width, height } = canvasBox();
     const [right, up] = [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
     const beam = eye.clone().set(right, up, 0.5).unproject(camera()).sub(eye);
     return onFloor(eye.clone().addScaledVector(beam, -eye.y / beam.y));
@@ -216,7 +210,7 @@
   /** The homography from the floor (x, y, 1) to pixels of the window, row by row; null until there is a view. */
   function floorToWindow() {
     if (!controls() || !camera()) return null;
-    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    const { left, top, width, height } = canvasBox();
     camera().updateMatrixWorld();
     const m = camera().projectionMatrix.clone().multiply(camera().matrixWorldInverse).elements;
     const [right, up, , depth] = [0, 1, 2, 3].map((i) => [-m[8 + i], -m[i], m[12 + i]]); // of x, y and 1

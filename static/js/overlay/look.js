@@ -3,8 +3,6 @@
 
 import { along, axesAt } from "./framing.js";
 
-const MARGIN = 1.08; // around a room that is looked at
-
 export class Look {
   /** `matrix` takes (x, y, 1) of the floor, m, to pixels, row by row; the view is `width` by `height` pixels. */
   constructor(matrix, width, height) {
@@ -55,11 +53,12 @@ function inverted([a, b, c, d, e, f, g, h, i]) {
 
 /** A camera of our own, for as long as the scene has none: the floor from above, dragged and zoomed by the pointer. */
 export class PlainCamera {
-  #held = null; // {centre, scale} as someone moved it; null while all is kept in the view
-  #wanted = { centre: [0, 0], halves: [5, 5], up: Math.PI / 2 }; // as framing.js has it
+  #held = null; // {middle, scale} as someone moved it; null while all is kept in the view
+  #wanted = { middle: [0, 0], half: 5, up: Math.PI / 2 }; // as framing.js has it
 
-  constructor(stage) {
-    this.stage = stage;
+  /** `size()` tells the view's {width, height} in pixels. */
+  constructor(size) {
+    this.size = size;
   }
 
   fit(framing) {
@@ -69,15 +68,15 @@ export class PlainCamera {
 
   look(framing) {
     this.#wanted = framing;
-    if (this.#held && framing.isFollowed) this.#held.centre = framing.centre;
+    if (this.#held && framing.isFollowed) this.#held.middle = framing.middle;
   }
 
   floorToWindow() {
-    const { clientWidth: width, clientHeight: height } = this.stage;
-    const { centre, scale, axes: [right, up] } = this.#state();
+    const { width, height } = this.size();
+    const { middle, scale, axes: [right, up] } = this.#state();
     return [
-      ...right.map((part) => scale * part), width / 2 - scale * along(right, centre),
-      ...up.map((part) => -scale * part), height / 2 + scale * along(up, centre),
+      ...right.map((part) => scale * part), width / 2 - scale * along(right, middle),
+      ...up.map((part) => -scale * part), height / 2 + scale * along(up, middle),
       0, 0, 1,
     ];
   }
@@ -89,24 +88,21 @@ export class PlainCamera {
 
   /** Enlarges what is seen; the pixel given stays where it is. */
   zoom([X, Y], factor) {
-    const { clientWidth: width, clientHeight: height } = this.stage;
+    const { width, height } = this.size();
     const [right, up] = [X - width / 2, height / 2 - Y].map((way) => way * (1 - 1 / factor));
     this.#move(right, up, factor);
   }
 
   /** Goes so many pixels to the right and up, and enlarges. */
   #move(right, up, factor) {
-    const { centre, scale, axes } = this.#state();
-    const [x, y] = centre.map((at, i) => at + (right * axes[0][i] + up * axes[1][i]) / scale);
-    this.#held = { centre: [x, y], scale: factor * scale };
+    const { middle, scale, axes } = this.#state();
+    const moved = middle.map((at, i) => at + (right * axes[0][i] + up * axes[1][i]) / scale);
+    this.#held = { middle: moved, scale: factor * scale };
   }
 
   #state() {
-    const { centre, halves, up } = this.#wanted;
-    const axes = axesAt(up);
-    if (this.#held) return { ...this.#held, axes };
-    const { clientWidth: width, clientHeight: height } = this.stage;
-    const scale = Math.min(width / halves[0], height / halves[1]) / (2 * MARGIN);
-    return { centre, scale, axes };
+    const { middle, half, up } = this.#wanted;
+    const held = this.#held ?? { middle, scale: this.size().height / (2 * half) };
+    return { ...held, axes: axesAt(up) };
   }
 }

@@ -46,9 +46,18 @@ export function mountOverlay() {
 /** The buttons of what one can do with the view; the pointer says what each is called. */
 function mountButtons() {
   for (const button of document.querySelectorAll(".scene-tools button")) button.title = button.getAttribute("aria-label");
+  $("scene-tools").addEventListener("click", ({ target }) => unfold(target.closest("#view-tools") && !isUnfolded()));
   $("measure").addEventListener("click", toggleMeasure);
   $("fullscreen").addEventListener("click", () => (document.fullscreenElement ? document.exitFullscreen() : $("stage").requestFullscreen()));
   for (const kind of ["png", "svg"]) $(`save-${kind}`).addEventListener("click", () => saveView(kind));
+}
+
+const isUnfolded = () => $("scene-tools").classList.contains("open");
+
+/** On a narrow page the buttons are folded into one; each folds them again. */
+function unfold(wanted) {
+  $("scene-tools").classList.toggle("open", Boolean(wanted));
+  $("view-tools").setAttribute("aria-expanded", String(Boolean(wanted)));
 }
 
 /** Draws with the scene's camera, and has its pointer. */
