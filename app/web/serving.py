@@ -53,10 +53,12 @@ def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_b
     """Serve until interrupted. Raises RecordingError or TopicError if the recording cannot be played."""
     from threadpoolctl import threadpool_limits
 
+    from ..memory import share_arenas
     from .log import throttle_servers
     from .server import create_app
     from .transport import allow_many_files
 
+    share_arenas()
     allow_many_files()
     throttle_servers()
     threadpool_limits(1)  # matrices are small: a second thread only waits for its turn, up to 20 ms

@@ -115,7 +115,12 @@ class Load:
     async def _ask(self, method: str, path: str, *expected: int, **content: object) -> bool:
         """Whether the answer was the first of those expected; any other than these is noted as wrong."""
         try:
-            answer = await self._http.request(method, path, **content)  # type: ignore[arg-type]
+            try:
+                answer = await self._http.request(method, path, **content)  # type: ignore[arg-type]
+            except (
+                httpx.ReadError
+            ):  # closed while idle, which a busy client may learn late: again, as browsers do
+                answer = await self._http.request(method, path, **content)  # type: ignore[arg-type]
         except httpx.TransportError as error:
             self.wrong[f"{method} {path}: {error!r}"] += 1
             return False
