@@ -7,9 +7,11 @@ SUDO := $(shell [ "$$(id -u)" = 0 ] || echo sudo)
 HOST ?= 127.0.0.1
 PORT ?= 8000
 RECORDING ?=
+MINUTES ?=
+SEED ?=
 bin := .venv/bin
 
-.PHONY: run test coverage mutants lint bench demo guide docs screenshots lock clean
+.PHONY: run test coverage mutants fuzz soak lint bench demo guide docs screenshots lock clean
 
 run: .venv/.run
 	$(bin)/lidarcore serve --host $(HOST) --http-port $(PORT) $(if $(RECORDING),"$(RECORDING)")
@@ -25,6 +27,14 @@ coverage: .venv/.dev
 # Whether the tests notice the seeded faults; in about half an hour.
 mutants: .venv/.dev
 	$(bin)/python tests/mutants/run.py
+
+# Broken files, bytes of a sensor, messages and requests, in five minutes unless told otherwise (MINUTES, SEED).
+fuzz: .venv/.dev
+	$(bin)/python tests/fuzz/run.py $(MINUTES:%=--minutes %) $(SEED:%=--seed %)
+
+# Whether a server that runs for an hour (MINUTES) stays as it was after five minutes.
+soak: .venv/.dev
+	$(bin)/python tests/soak/run.py $(MINUTES:%=--minutes %) $(SEED:%=--seed %)
 
 parallel := $(bin)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --durations=15
 browser := command -v chromium-headless-shell >/dev/null || { $(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends chromium-headless-shell fonts-dejavu-core; }

@@ -1,15 +1,14 @@
 """The pictures in the documentation: `python docs/screenshots.py FOLDER [NAME ...]` takes them anew.
 
 It starts a server of its own, brings it into each of twelve states, and looks at it with headless Chromium: on a desk
-(1400 x 900) and on a phone (390 x 844), in light and dark.
+(1400 x 900) in light and dark, and on a phone (390 x 844) in light.
 """
 
-import re
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -19,97 +18,135 @@ from typing import Any
 
 import httpx
 from PIL import Image
-from playwright.sync_api import Browser, expect, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 CHROMIUM = "/usr/bin/chromium-headless-shell"
 FLAGS = ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--hide-scrollbars"]
-DESK, PHONE = (1400, 900), (390, 844)
+LOOKS = (("light", (1400, 900), ""), ("dark", (1400, 900), ""), ("light", (390, 844), "-phone"))
 PATIENCE = 600.0  # s
+SETTLE = 4.0  # s; software draws the scene slowly, and the camera moves to fit the room
+QUALITY = 78  # of WebP: what is written small can still be read
+IS_DRAWN = """() => document.querySelector("#readout-frame")?.textContent > 0
+  && document.querySelector("#scene").contentWindow.lidarView?.floorToWindow()"""
+WALL = """async () => {
+  const { lookNow } = await import("/static/js/scene.js");
+  const { worldOf } = await import("/static/js/overlay/world.js");
+  const { get } = await import("/static/js/store.js");
+  const { walls } = worldOf(get("frame"), new Map());
+  const { ends: [[x0, y0], [x1, y1]] } = walls.sort((one, other) => other.length - one.length)[0];
+  return [[x0, y0], [(x0 + x1) / 2, (y0 + y1) / 2], [x1, y1]].map((place) => lookNow().toScreen(place));
+}"""
 DEFAULTS = dict.fromkeys(("clusters", "navigation", "view", "repeatability")) | {
     "extraction": {"covariance": None}  # the noise stays what it is for the sensor that plays
 }
 Json = dict[str, Any]
 
 
+def _click(*selectors: str) -> Callable[[Page], None]:
+    """Click these, also where a phone shows another panel."""
+
+    def act(page: Page) -> None:
+        for selector in selectors:
+            page.locator(selector).dispatch_event("click")
+
+    return act
+
+
+def _click_wall(page: Page) -> None:
+    """The longest, in its middle."""
+    _, (x, y), _ = page.evaluate(WALL)
+    _click_scene(page, x, y)
+    page.mouse.move(0, 0)
+
+
+def _measure_wall(page: Page) -> None:
+    """The longest, from end to end."""
+    page.locator("#measure").dispatch_event("click")
+    for x, y in page.evaluate(WALL)[::2]:
+        _click_scene(page, x, y)
+        page.wait_for_timeout(300)
+    page.mouse.move(0, 0)
+
+
+def _calibrate(page: Page) -> None:
+    """Show what was found; the first time it has to be measured."""
+    use = page.locator("#calibration [data-key=use]")
+    if not use.count():
+        page.locator("#calibrate button").dispatch_event("click")
+    use.wait_for(state="attached", timeout=1e3 * PATIENCE)
+    page.locator("#calibration").evaluate("node => node.scrollIntoView()")
+
+
+def _click_scene(page: Page, x: float, y: float) -> None:
+    box = page.locator("#scene").bounding_box()
+    assert box is not None
+    page.mouse.click(box["x"] + x, box["y"] + y)
+
+
 @dataclass(frozen=True)
 class Shot:
-    """One state of the page: what plays, which settings, which tab, and how long to let it run.
-
-    clicks are the selectors of what is pressed then.
-    """
+    """One state of the page: what plays, which settings and tab, how long it runs (s), and what is done then."""
 
     name: str
     tab: str = "setup"
     settings: Json = field(default_factory=dict)
     source: Json = field(default_factory=lambda: {"kind": "emulator"})
-    seconds: float = 3.0
-    settle: float = 6.0
-    clicks: tuple[str, ...] = ()
+    seconds: float = 0.0
+    act: Callable[[Page], None] = lambda _: None
     first_visit: bool = False
-    sizes: tuple[tuple[int, int], ...] = (DESK, PHONE)
-    themes: tuple[str, ...] = ("light", "dark")
+    path: str = ""
 
 
 TWO_ROOMS = {"kind": "simulation", "settings": {"world": "two rooms"}}
+PUBLISHED = {
+    "view": {"compare": True, "methods": ["cwlf", "wctls", "ml"]},
+    "extraction": {"covariance": "published"},
+}
 SHOTS = (
     Shot("welcome", first_visit=True),
     Shot("live"),
-    Shot("corner", clicks=("#corner-table tbody tr:nth-child(2) button",)),
+    Shot("compare", settings=PUBLISHED),
     Shot(
-        "compare",
-        settings={
-            "view": {"compare": True, "methods": ["cwlf", "wctls", "ml"]},
-            "extraction": {"covariance": "published"},
-        },
+        "corner",
+        tab="repeatability",
+        settings=PUBLISHED | {"repeatability": {"running": True}},
+        seconds=20,
+        act=_click("#corner-table tbody tr:nth-child(2) button"),
     ),
+    Shot("wall", settings=PUBLISHED, act=_click_wall),
+    Shot("measure", act=_measure_wall),
     Shot("rejected", tab="rejections", settings={"view": {"layers": {"rejected": True}}}),
-    Shot("calibration", seconds=0, clicks=("#calibrate button",), settle=60.0),
+    Shot("calibration", act=_calibrate),
     Shot("repeatability", tab="repeatability", settings={"repeatability": {"running": True}}, seconds=20),
-    Shot("plots", tab="plots"),
     Shot("recordings", tab="sources", source={"kind": "recording", "name": "real-rplidar-windsor.npz"}),
-    Shot("help", clicks=("#help",)),
-    Shot(
-        "walls",
-        tab="map",
-        settings={"navigation": {"mode": "slam", "method": "scans"}},
-        source=TWO_ROOMS,
-        seconds=60,
-    ),
-    Shot(
-        "map",
-        tab="map",
-        settings={"navigation": {"mode": "slam", "method": "landmarks"}},
-        source=TWO_ROOMS,
-        seconds=60,
-    ),
+    Shot("map", "map", {"navigation": {"mode": "slam", "method": "scans"}}, TWO_ROOMS, seconds=60),
+    Shot("landmarks", "map", {"navigation": {"mode": "slam", "method": "landmarks"}}, TWO_ROOMS, seconds=60),
 )
 
 
 def main(folder: Path, names: list[str]) -> None:
-    """Take those named, or all, as WebP files named NAME-THEME.webp and NAME-THEME-phone.webp."""
+    """Take those named, or all, as WebP files named NAME-light, NAME-dark and NAME-light-phone."""
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryDirectory() as home, _server(Path(home)) as url, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         with httpx.Client(base_url=f"{url}/api/v1", timeout=30) as api:
             for shot in SHOTS:
-                if names and shot.name not in names:
-                    continue
-                _take(shot, browser, api, url, folder)
+                if not names or shot.name in names:
+                    _prepare(shot, api)
+                    for theme, size, suffix in LOOKS:
+                        api.put("/selection", json={"corner": None, "landmark": None}).raise_for_status()
+                        path = folder / f"{shot.name}-{theme}{suffix}.webp"
+                        _save(_picture(browser, url, shot, theme, size), path)
+                        print(path, flush=True)
         browser.close()
 
 
-def _take(shot: Shot, browser: Browser, api: httpx.Client, url: str, folder: Path) -> None:
+def _prepare(shot: Shot, api: httpx.Client) -> None:
     api.patch("/settings", json=DEFAULTS).raise_for_status()
     if api.get("/source").json()["kind"] != shot.source["kind"]:
         api.put("/source", json=shot.source).raise_for_status()
     api.patch("/settings", json=shot.settings).raise_for_status()
     time.sleep(shot.seconds)
-    for theme in shot.themes:
-        api.patch("/settings", json={"view": {"theme": theme}}).raise_for_status()
-        for size in shot.sizes:
-            name = f"{shot.name}-{theme}{'-phone' if size == PHONE else ''}.webp"
-            _save(_picture(browser, url, shot, theme, size), folder / name)
-            print(folder / name, flush=True)
 
 
 def _picture(browser: Browser, url: str, shot: Shot, theme: str, size: tuple[int, int]) -> bytes:
@@ -119,22 +156,19 @@ def _picture(browser: Browser, url: str, shot: Shot, theme: str, size: tuple[int
         context.add_init_script("localStorage.setItem('welcomed', 'yes')")
     page = context.new_page()
     page.goto(url)
-    expect(page.locator("#readout-frame")).to_have_text(re.compile(r"^\d+$"), timeout=1e3 * PATIENCE)
+    page.wait_for_function(IS_DRAWN, timeout=1e3 * PATIENCE)
     page.locator(f"#tab-{shot.tab}").click()
-    if page.locator("#fit").is_visible():
-        page.locator("#fit").click()
-    for selector in shot.clicks:
-        page.locator(selector).dispatch_event("click")  # also where a phone shows another panel
-    page.wait_for_timeout(
-        1e3 * shot.settle
-    )  # software draws the scene slowly, and the camera moves to fit the room
+    _click("#fit")(page)
+    page.wait_for_timeout(1e3 * SETTLE)
+    shot.act(page)
+    page.wait_for_timeout(1e3 * SETTLE)
     picture = page.screenshot()
     context.close()
     return picture
 
 
 def _save(png: bytes, path: Path) -> None:
-    Image.open(BytesIO(png)).convert("RGB").save(path, quality=88, method=6)
+    Image.open(BytesIO(png)).convert("RGB").save(path, quality=QUALITY, method=6)
 
 
 @contextmanager

@@ -1,14 +1,10 @@
 // Runs in viser's page before viser does: turns its 3D view into a map seen from above, inside our page.
-// The parent uses window.lidarView, gives it the extent of each frame, and asks how the floor lies in the window, to draw
-// over it; it is sent the keys, so that its shortcuts work wherever the focus is, and the pose that someone drags:
-// {type: "pose", x, y, heading} in the world, m and rad.
+// The parent uses window.lidarView, says for each frame what to look at (overlay/framing.js), and asks how the floor lies
+// in the window, to draw over it; it is sent the keys, so that its shortcuts work wherever the focus is, {type: "dragged"}
+// when someone drags the view, and the pose that someone drags: {type: "pose", x, y, heading} in the world, m and rad.
 
 (() => {
   "use strict";
-  const NORTH_UP = Math.PI / 2; // azimuth at which y points up on the screen
-  const MARGIN = 1.08; // around the room when it is looked at,
-  const EDGE = 1.02; // and what has to be left of it
-  const SMALL = 0.6; // of the view: a room that fills less than this is looked at again
   const CLICK_PX = 4; // a pointer that moves less while it is pressed
   const SHORT_DRAG = 12; // px; shorter ones have no direction
   const POINT_PX = 3; // of the measured points, at every zoom
@@ -20,10 +16,11 @@
     .pose-catcher svg { width: 100%; height: 100%; fill: none; stroke: #ffe14d; stroke-width: 3 }
     .pose-catcher .halo { stroke: #14171a; stroke-width: 6 }`;
 
-  let room = null; // what the newest frame shows: from and to along x, along y, m in the world
+  let wanted = null; // what the newest frame shows, as framing.js has it
   let rotating = false;
   let moved = false; // by the user, since the last fit
   let pressed = null; // where the pointer went down last
+  let fingers = 0; // or other pointers that are down
   let placing = null; // what takes the drag of a pose
 
   // viser only reconnects while its window has the focus, which a frame or a wall display rarely has.
@@ -47,8 +44,18 @@
     view.dollyToCursor = true;
     view.minPolarAngle = 0;
     view.maxPolarAngle = rotating ? 0.48 * Math.PI : 0;
-    view.minAzimuthAngle = rotating ? -Infinity : NORTH_UP;
-    view.maxAzimuthAngle = rotating ? Infinity : NORTH_UP;
+    if (wanted) turn();
+  }
+
+  /** Which way is up: as wanted, or as it was rotated. */
+  function turn() {
+    const view = controls();
+    const isFree = rotating && !wanted.isTurned;
+    const way = wanted.up - view.azimuthAngle;
+    const azimuth = view.azimuthAngle + Math.atan2(Math.sin(way), Math.cos(way)); // no whole turns
+    view.minAzimuthAngle = isFree ? -Infinity : azimuth;
+    view.maxAzimuthAngle = isFree ? Infinity : azimuth;
+    if (!isFree && Math.abs(azimuth - view.azimuthAngle) > 1e-6) view.rotateTo(azimuth, view.polarAngle, false);
   }
 
   /** Rotation by dragging, or a map that only pans and zooms; back on the map, the room is fitted again. */
@@ -60,40 +67,30 @@
     if (!rotating) await fit();
   }
 
-  /** Look down on all of the extent, else on that of the newest frame. */
-  async function fit(extent = room) {
-    room = extent;
+  /** Look down on all that is to be seen, else on that of the newest frame. */
+  async function fit(framing = wanted) {
+    wanted = framing;
     await ready;
-    if (!room) return;
-    lookDownOn(spans());
+    if (!wanted) return;
+    lookDown();
     moved = false;
   }
 
-  /** Show a new frame; until the user moves the view, its extent is kept in it. */
-  async function follow(extent) {
-    room = extent;
+  /** Look at a new frame; until the user moves the view, all of it is kept in it. */
+  async function look(framing) {
+    wanted = framing;
     await ready;
-    if (moved || rotating || placing || document.hidden) return;
-    if (!isInView(spans())) lookDownOn(spans());
+    if (placing || document.hidden) return;
+    turn();
+    if (wanted.isFollowed) controls().moveTo(...inThree(...wanted.middle, 0), false);
+    if (!moved && !rotating && !wanted.isFramed) lookDown();
   }
 
-  /** Centre and half width of the room along x and y. */
-  const spans = () => room.map(([low, high]) => ({ centre: (low + high) / 2, half: (high - low) / 2 }));
-
-  function lookDownOn([x, y]) {
-    const height = (MARGIN * Math.max(y.half, x.half / camera().aspect)) / slope();
-    const eye = inThree(x.centre, y.centre - 1e-5 * height, height);
-    controls().setLookAt(...eye, ...inThree(x.centre, y.centre, 0), true);
-  }
-
-  function isInView(room) {
-    const middle = onFloor(controls().getTarget());
-    const half = controls().distance * slope();
-    const halves = [half * camera().aspect, half];
-    const inside = room.every(
-      ({ centre, half }, i) => Math.abs(centre - middle[i]) + EDGE * half < halves[i],
-    );
-    return inside && room.some(({ half }, i) => half > SMALL * halves[i]);
+  function lookDown() {
+    const { middle: [x, y], half, up } = wanted;
+    const height = half / slope();
+    const [back, aside] = [1e-5 * height * Math.cos(up), 1e-5 * height * Math.sin(up)];
+    controls().setLookAt(...inThree(x - back, y - aside, height), ...inThree(x, y, 0), true);
   }
 
   /** Whether the next drag says where the sensor is and where it looks. */
@@ -147,10 +144,18 @@
     return { type: "pose", x, y, heading: Math.atan2(toY - y, toX - x) };
   }
 
+  let box = null; // of the canvas in the window; to measure it at every look would take longer than all the rest
+
+  function canvasBox() {
+    const canvas = document.querySelector("canvas");
+    if (!box) new ResizeObserver(() => (box = canvas.getBoundingClientRect())).observe(canvas);
+    return (box ??= canvas.getBoundingClientRect());
+  }
+
   /** Where the ray through a point of the window meets the floor. */
   function floorAt({ clientX, clientY }) {
     const eye = camera().position;
-    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    const { left, top, width, height } = canvasBox();
     const [right, up] = [(2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height];
     const beam = eye.clone().set(right, up, 0.5).unproject(camera()).sub(eye);
     return onFloor(eye.clone().addScaledVector(beam, -eye.y / beam.y));
@@ -158,8 +163,14 @@
 
   /** Whether the pointer drags the view; a click that selects something does not. */
   function isDrag({ buttons, clientX, clientY }) {
-    if (!buttons || !pressed) return false;
+    if (!buttons || !pressed || placing) return false;
     return Math.hypot(clientX - pressed.clientX, clientY - pressed.clientY) > CLICK_PX;
+  }
+
+  function drag(event) {
+    if (!isDrag(event)) return;
+    moved = true;
+    if (fingers < 2) tell({ type: "dragged" });
   }
 
   function tell(message) {
@@ -196,16 +207,10 @@
     if (isStale) requestRender();
   }
 
-  /** viser makes objects anew when what they hold changes its size, so they are looked after all the time. */
-  function keepHidden() {
-    applyHidden();
-    requestAnimationFrame(keepHidden);
-  }
-
   /** The homography from the floor (x, y, 1) to pixels of the window, row by row; null until there is a view. */
   function floorToWindow() {
     if (!controls() || !camera()) return null;
-    const { left, top, width, height } = document.querySelector("canvas").getBoundingClientRect();
+    const { left, top, width, height } = canvasBox();
     camera().updateMatrixWorld();
     const m = camera().projectionMatrix.clone().multiply(camera().matrixWorldInverse).elements;
     const [right, up, , depth] = [0, 1, 2, 3].map((i) => [-m[8 + i], -m[i], m[12 + i]]); // of x, y and 1
@@ -233,19 +238,25 @@
     }
   }
 
-  /** viser sets the sizes itself when its window or the points change, so ours are looked after all the time. */
-  function keepSizes() {
+  let ticked = () => {};
+
+  /** Calls `run(viser's state)` before every picture. */
+  const onTick = (run) => (ticked = run);
+
+  /** viser makes objects anew when what they hold changes its size, and sizes points itself: ours are kept all the time. */
+  function keep() {
+    ticked(window.__viserMutable);
+    applyHidden();
     sizePoints();
-    requestAnimationFrame(keepSizes);
+    requestAnimationFrame(keep);
   }
 
   async function start() {
     while (!controls() || !camera()) await pause(50);
     applyMode();
-    keepHidden();
     controls().addEventListener("update", () => looked());
     window.addEventListener("resize", () => looked());
-    keepSizes();
+    keep();
   }
 
   const style = document.createElement("style");
@@ -253,8 +264,9 @@
   document.head.append(style);
   window.addEventListener("keydown", forwardKey, true);
   window.addEventListener("wheel", () => (moved ||= !placing), { capture: true, passive: true });
-  window.addEventListener("pointerdown", (event) => (pressed = event), true);
-  window.addEventListener("pointermove", (event) => (moved ||= !placing && isDrag(event)), true);
+  window.addEventListener("pointerdown", (event) => (fingers++, (pressed = event)), true);
+  for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => (fingers = Math.max(0, fingers - 1)), true);
+  window.addEventListener("pointermove", drag, true);
   const ready = start();
-  window.lidarView = { setRotate, fit, follow, setPlacing, floorToWindow, onLook, hide };
+  window.lidarView = { setRotate, fit, look, setPlacing, floorToWindow, onLook, onTick, hide };
 })();

@@ -69,7 +69,13 @@ class ViewSettings(_Frozen):
     colour: Annotated[Colour, Field(description="what colours the points")] = "plain"
     ellipse_scale: Annotated[
         float,
-        Field(ge=1, le=100, allow_inf_nan=False, description="size of the ellipses in sigma"),
+        Field(
+            ge=1,
+            le=100,
+            allow_inf_nan=False,
+            description="size of the ellipses in sigma. "
+            "More: larger ellipses on the screen; what they claim stays",
+        ),
     ] = 10.0
     theme: Annotated[
         Literal["dark", "light"],
@@ -91,7 +97,12 @@ class RepeatabilitySettings(_Frozen):
 
     running: Annotated[bool, Field(description="whether new scans are compared")] = False
     window: Annotated[
-        int, Field(ge=LEAST, le=1000, description="how many of the newest scans to compare")
+        int,
+        Field(
+            ge=LEAST,
+            le=1000,
+            description="how many of the newest scans to compare. More: surer verdicts, later",
+        ),
     ] = WINDOW
 
 

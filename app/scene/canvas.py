@@ -13,8 +13,8 @@ from .shapes import DISC_FACES, DISC_VERTICES, Array, about_z, lift
 FIELD_OF_VIEW = np.radians(6.0)  # so narrow that the picture is nearly orthographic
 FAR = 2e4  # m
 HEIGHTS = {  # from the floor up
-    "occupancy": -1, "walls": 1, "gaps": 1, "true": 1, "reckoned": 1, "cluster fill": 1, "trail": 2, "segments": 2,
-    "clusters": 3, "points": 4, "rejected": 5, "associations": 6,
+    "occupancy": -1, "walls": 1, "gaps": 1, "true": 1, "reckoned": 1, "cluster fill": 1, "trail": 2, "clusters": 3,
+    "points": 4, "segments": 5, "rejected": 6, "associations": 7,
 }  # fmt: skip
 
 BODY = frozenset(("gaps", "segments", "cluster fill", "clusters", "points", "rejected"))

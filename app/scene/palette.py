@@ -1,4 +1,4 @@
-"""Colours and dashes of the methods, and the colours of what else the scene draws, for a dark and a light page.
+"""Colours and dashes of the methods, and the colours of what else is drawn, for a dark and a light page.
 
 Those of the methods are told apart with any colour vision: tests/app/test_palette.py simulates it.
 """
@@ -13,12 +13,12 @@ PALETTE = {
     "dark": {
         "points": "#9fb0c8", "rejected": "#ff5c5c", "cluster": "#e58fd0", "trail": "#e8c468", "reckoned": "#8a6fb0",
         "true": "#4f8fd0", "association": "#c8d2e0", "ambiguous": "#ff9d5c", "free": "#232b36", "occupied": "#8494a8",
-        "wall": "#6fd3e8",
+        "wall": "#6fd3e8", "landmark": "#5ad1a4", "tentative": "#6b7686",
     },
     "light": {
         "points": "#56657a", "rejected": "#c92a2a", "cluster": "#a83a90", "trail": "#a86f00", "reckoned": "#7b4fb0",
         "true": "#1f6fb8", "association": "#46536a", "ambiguous": "#c45a00", "free": "#e4eaf1", "occupied": "#515d6c",
-        "wall": "#0a7f97",
+        "wall": "#0a7f97", "landmark": "#0b7a55", "tentative": "#9aa5b4",
     },
 }  # fmt: skip
 
@@ -51,3 +51,10 @@ def method_rgb(name: str, theme: str) -> Rgbs:
 def theme_colour(theme: str, name: str) -> Rgbs:
     """The colour (3,) of something in a theme."""
     return np.array(rgb(PALETTE[theme][name]), np.uint8)
+
+
+def stylesheet() -> str:
+    """The colours but those of the methods, as custom properties for the page: `--trail` and so on."""
+    dark, light = PALETTE["dark"], PALETTE["light"]
+    lines = (f"  --{name}: light-dark({light[name]}, {dark[name]});" for name in dark)
+    return "\n".join((":root {", *lines, "}\n"))

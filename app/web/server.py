@@ -7,8 +7,9 @@ from pathlib import Path
 from anyio import CapacityLimiter
 from fastapi import APIRouter, FastAPI
 from fastapi.staticfiles import StaticFiles
-from starlette.responses import FileResponse
+from starlette.responses import FileResponse, Response
 
+from ..scene.palette import stylesheet
 from . import problems
 from .description import DESCRIPTION
 from .documentation import Documentation
@@ -79,6 +80,7 @@ def create_app(options: ServerOptions) -> FastAPI:
     state.viser.install(app)
     for path, file in PAGES.items():
         _add_page(app, path, file)
+    _add_palette(app)
     app.mount("/documentation", Documentation(), name="documentation")
     app.mount("/static", StaticFiles(directory=STATIC), name="static")
     uploads = (f"{API}/recordings/", f"{API}/map")
@@ -90,3 +92,9 @@ def _add_page(app: FastAPI, path: str, file: str) -> None:
     @app.get(path, include_in_schema=False)
     def page() -> FileResponse:
         return FileResponse(STATIC / file)
+
+
+def _add_palette(app: FastAPI) -> None:
+    @app.get("/palette.css", include_in_schema=False)
+    def palette() -> Response:
+        return Response(stylesheet(), media_type="text/css")

@@ -23,17 +23,30 @@ class ClusterSettings:
         str, Field(description="clustering method", json_schema_extra={"enum": list(CLUSTERERS)})
     ] = "heuristic"
     distance: Annotated[
-        float, number(0.01, 10.0, "m", "heuristic: consecutive points farther apart are different objects")
+        float,
+        number(
+            0.01,
+            10.0,
+            "m",
+            "heuristic: consecutive points farther apart are different objects. More: fewer, larger clusters",
+        ),
     ] = 0.3
-    eps: Annotated[float, number(0.01, 10.0, "m", "dbscan: points at most this far apart are neighbours")] = (
-        0.3
-    )
+    eps: Annotated[
+        float,
+        number(
+            0.01,
+            10.0,
+            "m",
+            "dbscan: points at most this far apart are neighbours. More: fewer, larger clusters",
+        ),
+    ] = 0.3
     min_points: Annotated[
         int,
         Field(
             ge=2,
             le=1000,
-            description="a cluster needs at least this many points, as for dbscan a dense neighbourhood does",
+            description="a cluster needs at least this many points, as for dbscan a dense neighbourhood does. "
+            "More: small things are left out",
         ),
     ] = 3
     k: Annotated[
@@ -42,12 +55,28 @@ class ClusterSettings:
             ge=1,
             le=200,
             description="kmeans, gmm: number of clusters, fewer where there are fewer points; none to choose it for "
-            "every scan from 1 to k_max, kmeans by the silhouette, gmm by the Bayesian information criterion",
+            "every scan from 1 to k_max, kmeans by the silhouette, gmm by the Bayesian information criterion. "
+            "More: smaller clusters",
         ),
     ] = None
-    k_max: Annotated[int, Field(ge=1, le=50, description="kmeans, gmm: most clusters to choose from")] = 12
+    k_max: Annotated[
+        int,
+        Field(
+            ge=1,
+            le=50,
+            description="kmeans, gmm: most clusters to choose from. "
+            "More: more clusters where there are many things, and more time",
+        ),
+    ] = 12
     max_range: Annotated[
-        float | None, number(0.1, 1000.0, "m", "points farther from the sensor are left out; none for all")
+        float | None,
+        number(
+            0.1,
+            1000.0,
+            "m",
+            "points farther from the sensor are left out; none for all. "
+            "More: things farther away are clusters, too",
+        ),
     ] = None
     noise: SensorNoise = field(default_factory=SensorNoise)
 

@@ -13,11 +13,9 @@ class PoseTrack:
     """
 
     def __init__(self, stamps: Array, poses: Array) -> None:
-        table = np.column_stack([stamps, poses])
-        table = table[np.isfinite(table).all(axis=1)]
-        table = table[np.argsort(table[:, 0], kind="stable")]
-        self._stamps, self._x, self._y = table[:, 0], table[:, 1], table[:, 2]
-        self._heading = np.unwrap(table[:, 3])
+        kept = np.flatnonzero(np.isfinite(stamps) & np.isfinite(poses).all(axis=1))
+        kept = kept[np.argsort(stamps[kept], kind="stable")]
+        self._stamps, self._poses = stamps[kept], poses[kept]
 
     def __len__(self) -> int:
         return len(self._stamps)
@@ -26,7 +24,13 @@ class PoseTrack:
         """Pose (3,) at the stamp in s, or None before the first or after the last pose."""
         if not len(self) or not self._stamps[0] <= stamp <= self._stamps[-1]:
             return None
-        x, y, heading = (
-            np.interp(stamp, self._stamps, values) for values in (self._x, self._y, self._heading)
-        )
+        last = int(np.searchsorted(self._stamps, stamp, "right")) - 1
+        before, since = self._poses[last], stamp - self._stamps[last]
+        if since == 0:
+            step = np.zeros(3)
+        else:
+            step = self._poses[last + 1] - before
+            step[2] = wrap(step[2])
+            step *= since / (self._stamps[last + 1] - self._stamps[last])
+        x, y, heading = before + step
         return np.array([x, y, wrap(heading)])

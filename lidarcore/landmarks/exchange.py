@@ -14,6 +14,8 @@ from typing import Any, TextIO
 
 from lidarcore.errors import LandmarkError, MapFileError
 from lidarcore.files import replacing
+from lidarcore.files.json_reader import JsonReader
+from lidarcore.files.streams import MAX_LINE
 from lidarcore.landmarks.landmark import COLUMNS, Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
 
@@ -85,7 +87,7 @@ def _write_csv(rows: Iterable[Row], file: TextIO) -> None:
 
 
 def _read_csv(file: TextIO) -> Iterator[Row]:
-    reader = csv.reader(file, strict=True)
+    reader = csv.reader(_lines(file), strict=True)
     header = next(reader, [])
     names = {csv_name: name for name, csv_name in _CSV_NAMES.items()}
     if unknown := [name for name in header or [""] if name not in names]:
@@ -101,11 +103,18 @@ def _read_csv(file: TextIO) -> Iterator[Row]:
         }
 
 
+def _lines(file: TextIO) -> Iterator[str]:
+    while line := file.readline(MAX_LINE):
+        if len(line) == MAX_LINE:
+            raise MapFileError(f"A line is longer than {MAX_LINE} characters: this is no table of landmarks.")
+        yield line
+
+
 def _write_json(rows: Iterable[Row], file: TextIO) -> None:
     _write_document(_HEADER, "landmarks", rows, file)
 
 
-def _read_json(file: TextIO) -> list[Row]:
+def _read_json(file: TextIO) -> Iterator[Row]:
     return _items(file, "landmarks")
 
 
@@ -145,17 +154,39 @@ def _write_document(head: Row, key: str, items: Iterable[Row], file: TextIO) -> 
     file.write("\n]}\n")
 
 
-def _items(file: TextIO, key: str) -> list[Row]:
+def _items(file: TextIO, key: str) -> Iterator[Row]:
     """The items of such a JSON object, if it is one of this format, version and unit."""
-    document = json.load(file)
-    if not isinstance(document, dict):
+    reader, head = JsonReader(file), Row()
+    if reader.next() != "{":
+        reader.value()
         raise MapFileError(f"This holds no object with {key}: export a map to see what is expected.")
-    if (head := {name: document.get(name) for name in _HEADER}) != _HEADER:
-        raise MapFileError(f"This says {head}, expected is {_HEADER}: convert it, or update lidarcore.")
-    items = document.get(key)
-    if not (isinstance(items, list) and all(isinstance(item, dict) for item in items)):
+    is_there = False
+    for name in reader.members():
+        if name == key:
+            _check_head(head, {name: _HEADER[name] for name in head})
+            is_there = True
+            yield from _objects(reader, key)
+        elif (value := reader.value()) is not None and name in _HEADER:
+            head[name] = value
+    if reader.next():
+        raise MapFileError("There is more after the end of the object: export the map anew.")
+    _check_head(head, _HEADER)
+    if not is_there:
         raise MapFileError(f"{key} is no list of objects.")
-    return items
+
+
+def _objects(reader: JsonReader, key: str) -> Iterator[Row]:
+    items = reader.items() if reader.next() == "[" else [None]
+    for item in items:
+        if not isinstance(item, dict):
+            raise MapFileError(f"{key} is no list of objects.")
+        yield item
+
+
+def _check_head(head: Row, expected: Row) -> None:
+    if head != expected:
+        says = {name: head.get(name) for name in _HEADER}
+        raise MapFileError(f"This says {says}, expected is {_HEADER}: convert it, or update lidarcore.")
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,23 +18,73 @@ _CONFIG = ConfigDict(extra="forbid")
 class OdometryNoise:
     """Random walk of odometry: variances grow with the way and the turn, however finely they are cut into steps."""
 
-    along: Annotated[float, number(1e-4, 1, "m/√m", "standard deviation ahead after one metre")] = 0.03
-    across: Annotated[float, number(1e-4, 1, "m/√m", "standard deviation sideways after one metre")] = 0.01
+    along: Annotated[
+        float,
+        number(
+            1e-4,
+            1,
+            "m/√m",
+            "standard deviation ahead after one metre. "
+            "More: scans correct the way that odometry reports by more",
+        ),
+    ] = 0.03
+    across: Annotated[
+        float,
+        number(
+            1e-4,
+            1,
+            "m/√m",
+            "standard deviation sideways after one metre. More: scans correct sideways slip by more",
+        ),
+    ] = 0.01
     heading_per_metre: Annotated[
-        float, number(1e-4, 1, "rad/√m", "standard deviation of the heading after one metre")
+        float,
+        number(
+            1e-4,
+            1,
+            "rad/√m",
+            "standard deviation of the heading after one metre. "
+            "More: scans correct the heading on straight ways by more",
+        ),
     ] = 0.02
     heading_per_radian: Annotated[
-        float, number(1e-4, 1, "rad/√rad", "standard deviation of the heading after turning one radian")
+        float,
+        number(
+            1e-4,
+            1,
+            "rad/√rad",
+            "standard deviation of the heading after turning one radian. More: scans correct turns by more",
+        ),
     ] = 0.05
     slip_per_radian: Annotated[
-        float, number(0, 1, "m/√rad", "standard deviation of the position after turning one radian")
+        float,
+        number(
+            0,
+            1,
+            "m/√rad",
+            "standard deviation of the position after turning one radian. "
+            "More: scans correct the position after turns by more",
+        ),
     ] = 0.01
     unseen: Annotated[
         float,
-        number(0, 1, "m/√s", "drift of the position per root second that odometry does not report"),
+        number(
+            0,
+            1,
+            "m/√s",
+            "drift of the position per root second that odometry does not report. "
+            "More: the position grows vague sooner at rest",
+        ),
     ] = 0.002
     unseen_turn: Annotated[
-        float, number(0, 1, "rad/√s", "drift of the heading per root second that odometry does not report")
+        float,
+        number(
+            0,
+            1,
+            "rad/√s",
+            "drift of the heading per root second that odometry does not report. "
+            "More: the heading grows vague sooner at rest",
+        ),
     ] = 0.002
 
     @property
@@ -58,16 +108,52 @@ class OdometryNoise:
 class VelocityNoise:
     """White accelerations of the constant-velocity model."""
 
-    acceleration: Annotated[float, number(1e-4, 50, "m/s/√s", "change of the speed within a second")] = 0.5
+    acceleration: Annotated[
+        float,
+        number(
+            1e-4,
+            50,
+            "m/s/√s",
+            "change of the speed within a second. "
+            "More: faster starts and stops are followed, and the pose is vaguer between scans",
+        ),
+    ] = 0.5
     sideways: Annotated[
-        float, number(0, 50, "m/s/√s", "change of the speed sideways within a second; 0 if it never slides")
+        float,
+        number(
+            0,
+            50,
+            "m/s/√s",
+            "change of the speed sideways within a second; 0 if it never slides. More: it may slide faster",
+        ),
     ] = 0.5
     turn_acceleration: Annotated[
-        float, number(1e-4, 50, "rad/s/√s", "change of the turn rate within a second")
+        float,
+        number(
+            1e-4,
+            50,
+            "rad/s/√s",
+            "change of the turn rate within a second. "
+            "More: faster turns are followed, and the heading is vaguer between scans",
+        ),
     ] = 1.0
-    speed: Annotated[float, number(1e-3, 50, "m/s", "standard deviation of the speed at the start")] = 1.0
+    speed: Annotated[
+        float,
+        number(
+            1e-3,
+            50,
+            "m/s",
+            "standard deviation of the speed at the start. More: a start in motion is followed",
+        ),
+    ] = 1.0
     turn_rate: Annotated[
-        float, number(1e-3, 50, "rad/s", "standard deviation of the turn rate at the start")
+        float,
+        number(
+            1e-3,
+            50,
+            "rad/s",
+            "standard deviation of the turn rate at the start. More: a start in a turn is followed",
+        ),
     ] = 1.0
 
 
@@ -80,23 +166,70 @@ class LocalizationSettings:
     ] = "odometry"
     odometry: OdometryNoise = field(default_factory=OdometryNoise)
     velocity: VelocityNoise = field(default_factory=VelocityNoise)
-    max_speed: Annotated[float, number(0.01, 100, "m/s", "odometry that is faster has jumped")] = 3.0
-    max_turn_rate: Annotated[float, number(0.01, 100, "rad/s", "odometry that turns faster has jumped")] = 6.0
+    max_speed: Annotated[
+        float,
+        number(0.01, 100, "m/s", "odometry that is faster has jumped. More: wilder odometry is believed"),
+    ] = 3.0
+    max_turn_rate: Annotated[
+        float,
+        number(0.01, 100, "rad/s", "odometry that turns faster has jumped. More: wilder turns are believed"),
+    ] = 6.0
     gate: Annotated[
-        float, number(0.5, 0.9999, "", "share of the true pairs that the chi-square gate lets through")
+        float,
+        number(
+            0.5,
+            0.9999,
+            "",
+            "share of the true pairs that the chi-square gate lets through. "
+            "More: fewer true pairs are lost, more wrong ones are taken",
+        ),
     ] = 0.99
     new_gate: Annotated[
-        float, number(0.9, 0.999999999, "", "a new landmark lies outside this gate of every known one")
+        float,
+        number(
+            0.9,
+            0.999999999,
+            "",
+            "a new landmark lies outside this gate of every known one. "
+            "More: fewer landmarks twice, and of those close together fewer at all",
+        ),
     ] = 0.99999
     ambiguity: Annotated[
-        float, number(1, 1e3, "", "a pair is ambiguous if it is not this many times likelier than another")
+        float,
+        number(
+            1,
+            1e3,
+            "",
+            "a pair is ambiguous if it is not this many times likelier than another. "
+            "More: fewer wrong pairs, more that are left out",
+        ),
     ] = 10.0
-    confirm: Annotated[int, Field(ge=1, le=1000, description="sightings that confirm a landmark")] = 4
+    confirm: Annotated[
+        int,
+        Field(
+            ge=1,
+            le=1000,
+            description="sightings that confirm a landmark. More: fewer false landmarks, true ones later",
+        ),
+    ] = 4
     settle: Annotated[
-        float, number(0, 600, "s", "time from its first sighting before a landmark is confirmed")
+        float,
+        number(
+            0,
+            600,
+            "s",
+            "time from its first sighting before a landmark is confirmed. "
+            "More: fewer of what walks by, true ones later",
+        ),
     ] = 1.0
     memory: Annotated[
-        int, Field(ge=1, le=10000, description="sightings that count against views without it")
+        int,
+        Field(
+            ge=1,
+            le=10000,
+            description="sightings that count against views without it. "
+            "More: landmarks that are gone stay longer",
+        ),
     ] = 10
 
     unevenness: Annotated[
@@ -105,7 +238,8 @@ class LocalizationSettings:
             0,
             0.5,
             "m",
-            "standard deviation of where a landmark seems to be from one place or another, beside noise",
+            "standard deviation of where a landmark seems to be from one place or another, beside noise. "
+            "More: a vaguer map that is less easily wrong",
         ),
     ] = 0.01
 
@@ -140,7 +274,8 @@ class NavigationSettings:
             0.01,
             10,
             "m",
-            "wider clusters are no landmarks: the mean of a wall depends on how much of it is in view",
+            "wider clusters are no landmarks: the mean of a wall depends on how much of it is in view. "
+            "More: larger things are landmarks, too",
         ),
     ] = 0.5
     filter: LocalizationSettings = field(default_factory=LocalizationSettings)

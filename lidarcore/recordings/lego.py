@@ -64,7 +64,7 @@ class LegoLog(LaserLog):
                         self._parse(line.split())
                     except (ValueError, IndexError):
                         self._remark(f"Damaged lines of {beside.name} are left out.")
-        return np.array(self._tables[kind]).reshape(-1, 3)
+        return np.array(self._tables.pop(kind, [])).reshape(-1, 3)
 
     def _parse(self, words: list[bytes]) -> Reading | None:
         kind = words[0] if words else b""

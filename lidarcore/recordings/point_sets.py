@@ -61,10 +61,11 @@ def _pieces(stream: IO[bytes]) -> Iterator[tuple[str, Array]]:
             if is_empty or text[:cut].strip():
                 yield name, np.array(json.loads(b"[" + text[:cut].strip(b", \r\n\t") + b"]"), np.float64)
             is_empty = False
-            more = stream.read(PIECE)
-            if end is None and not more:
+            text = text[end.end() if end else cut :]
+            more = stream.read(PIECE) if len(text) < PIECE else b""
+            if not (end or more):
                 raise EOFError(f"the points of {name} do not end")
-            text = text[end.end() if end else cut :] + more
+            text += more
     if not _END.match(text):
         raise ValueError(f"there is {text[:40]!r} where a name or the end should be")
 

@@ -26,6 +26,7 @@ const columnsFor = (methods) => [
   ...ANGLE.map((quantity) => ({ quantity })),
 ];
 
+const DENSE = 3; // methods beyond which the columns have to be narrow
 let columns = ""; // the methods the header is made for
 let rows;
 
@@ -55,7 +56,7 @@ function draw({ methods, corners }, known) {
 function makeHead(methods, known) {
   columns = methods.join();
   rows.update([]);
-  $("corner-table").classList.toggle("compare", methods.length > 1);
+  $("corner-table").classList.toggle("dense", methods.length > DENSE);
   const titles = new Map(known.map(({ name, title }) => [name, title]));
   const groups = methods.map((name) => {
     const title = titles.get(name) ?? name;

@@ -24,12 +24,19 @@ const caption = el("p", { class: "muted" });
 const counts = el("ul", { class: "held" });
 const start = el("button", { type: "button", title: "Keep the sensor still meanwhile" }, "Compare with the next scans");
 
+const fold = iconButton("fold", "Fold the inspector", () => {
+  const isFolded = $("inspector").classList.toggle("folded");
+  fold.setAttribute("aria-expanded", String(!isFolded));
+});
+fold.id = "fold";
+fold.setAttribute("aria-expanded", "true");
+
 /** The card is made once: what a finger presses is still there when it is lifted. */
 export function mountInspector() {
   mountInspectedWall();
   start.addEventListener("click", () => changeSetting("repeatability.running", true));
   const close = iconButton("close", "Close the inspector", () => select({ corner: null }));
-  $("inspector").append(el("h2", {}, title, close), facts, rows, ways, drawing, caption, counts, start);
+  $("inspector").append(el("h2", {}, title, fold, close), facts, rows, ways, drawing, caption, counts, start);
   for (const key of SHOWN) on([key], refresh);
 }
 

@@ -18,7 +18,14 @@ function stored() {
   }
 }
 
-const keep = () => localStorage.setItem(KEY, JSON.stringify(Object.fromEntries(own)));
+let kept = ""; // as it is stored: states come often, and are written only if they differ
+
+function keep() {
+  const text = JSON.stringify(Object.fromEntries(own));
+  if (text !== kept) localStorage.setItem(KEY, text);
+  kept = text;
+}
+
 const at = (view, path) => path.split(".").reduce((node, key) => node?.[key], view);
 const nest = (path, value) => path.split(".").reduceRight((inner, key) => ({ [key]: inner }), value);
 

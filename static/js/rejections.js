@@ -38,7 +38,7 @@ function group(title, items) {
 /** A click on it shows where that was. */
 function entry({ message, xy }) {
   if (!xy?.every(Number.isFinite)) return el("li", {}, message);
-  const where = ` at\u00a0(${fixed(xy[0], 2)},\u00a0${fixed(xy[1], 2)})\u00a0m`;
+  const where = `at\u00a0(${fixed(xy[0], 2)},\u00a0${fixed(xy[1], 2)})\u00a0m`;
   const onclick = () => set("place", placer(get("frame").localization?.pose)(xy));
   return el("li", {}, el("button", { type: "button", class: "where", title: "Show the place", onclick }, message, el("small", {}, where)));
 }

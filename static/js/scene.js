@@ -3,18 +3,24 @@
 
 import { $ } from "./dom.js";
 import { setting, toggleSetting } from "./actions.js";
+import { Fading } from "./overlay/fading.js";
+import { framingOf, isFramed } from "./overlay/framing.js";
 import { Look, PlainCamera } from "./overlay/look.js";
+import { letGo } from "./overlay/tools.js";
 import { get, on } from "./store.js";
 
 /** What the scene's frame offers, once it has started. */
 export const view = () => $("scene").contentWindow?.lidarView;
 
-const plain = new PlainCamera($("stage"));
+const NUMBERS_PX = 20; // of the grid, below
+const narrow = matchMedia("(max-width: 899px)");
+const plain = new PlainCamera(() => sheetNow());
+const fading = new Fading(() => get("tools").fade);
 
 /** How the floor is seen now. */
 export function lookNow() {
-  const { clientWidth, clientHeight } = $("stage");
-  return new Look(view()?.floorToWindow() ?? plain.floorToWindow(), clientWidth, clientHeight);
+  const { width, height } = sheetNow();
+  return new Look(view()?.floorToWindow() ?? plain.floorToWindow(), width, height);
 }
 
 /** The camera that the pointer moves over a scene that has none; else null. */
@@ -28,36 +34,75 @@ export const onSceneMessage = (type, run) => handlers.set(type, run);
 /** `press(event)` receives the keys pressed in the scene. */
 export function mountScene(press) {
   onSceneMessage("keydown", press);
+  onSceneMessage("dragged", letGo);
   $("fit").addEventListener("click", () => fitScene());
   $("rotate").addEventListener("click", () => toggleSetting("view.rotate"));
-  $("scene").addEventListener("load", () => {
-    applyRotation();
-    hideLayers();
-    if (get("frame")) follow(get("frame"));
-  });
+  $("scene").addEventListener("load", begin);
+  watchSheet();
   on(["settings"], () => {
     applyRotation();
     hideLayers();
   });
-  on(["frame"], (frame) => {
-    $("stage").classList.remove("waiting");
-    follow(frame);
+  const stop = on(["frame"], () => {
+    requestAnimationFrame(() => setTimeout(() => ($("scene").src = "viser/")));
+    stop();
   });
+  on(["frame", "tools"], look);
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
     if (ours) handlers.get(data?.type)?.(data);
   });
 }
 
-function follow({ extent }) {
-  plain.follow(extent);
-  view()?.follow(extent);
+/** With what the scene's frame has to know from its start. It takes long, so the first frame is drawn without it. */
+function begin() {
+  $("stage").classList.remove("waiting");
+  applyRotation();
+  hideLayers();
+  view()?.onTick((scene) => fading.tick(scene));
+  look();
+}
+
+function look() {
+  const framing = framed(get("frame"));
+  if (!framing) return;
+  plain.look(framing);
+  view()?.look(framing);
+}
+
+function framed(frame) {
+  if (!frame) return undefined;
+  const framing = framingOf(frame.extent, frame.localization?.pose, get("tools"), sheetNow());
+  return { ...framing, isFramed: isFramed(frame.extent, lookNow(), sheetNow()) };
+}
+
+let sheet = null; // as it was measured last
+
+const sheetNow = () => (sheet ??= measuredSheet());
+
+/** To be measured anew when something over the view comes, goes or changes its size: to measure takes time. */
+function watchSheet() {
+  const forget = () => (sheet = null);
+  const sizes = new ResizeObserver(forget);
+  for (const id of ["stage", "legend"]) sizes.observe($(id));
+  new MutationObserver(forget).observe($("stage"), { childList: true });
+}
+
+/** The size of the view, and how much of its edges is taken, in pixels; on a narrow page that would leave too little. */
+function measuredSheet() {
+  const { clientWidth: width, clientHeight: height } = $("stage");
+  if (narrow.matches) return { width, height, left: 0, right: 0, top: 0, bottom: NUMBERS_PX };
+  const [legend, tools, strip] = [$("legend"), $("scene-tools"), $("welcome")];
+  const left = legend.open ? legend.offsetLeft + legend.offsetWidth : 0;
+  const top = strip ? strip.offsetTop + strip.offsetHeight : 0;
+  return { width, height, left, right: width - tools.offsetLeft, top, bottom: NUMBERS_PX };
 }
 
 /** Fits the room of a frame, else of the newest one, in the view. */
 export function fitScene(frame = get("frame")) {
-  plain.fit(frame?.extent);
-  view()?.fit(frame?.extent);
+  const framing = framed(frame);
+  plain.fit(framing);
+  view()?.fit(framing);
 }
 
 function applyRotation() {

@@ -6,6 +6,7 @@ import { nextLandmark } from "./landmarks.js";
 import { toggleMethod } from "./method.js";
 import { nextMode } from "./navigation.js";
 import { cancelMeasure, toggleMeasure } from "./overlay/measure.js";
+import { toggleTool } from "./overlay/tools.js";
 import { cancelPlacing, togglePlacing } from "./placing.js";
 import { toggleRecording } from "./recorder.js";
 import { fitScene } from "./scene.js";
@@ -69,6 +70,8 @@ const SHORTCUTS = [
   { keys: ["i"], about: "Set the pose by dragging", run: togglePlacing },
   { keys: ["d"], about: "Measure a distance", run: toggleMeasure },
   { keys: ["f"], about: "Fit the room in the view", run: () => fitScene() },
+  { keys: ["n"], about: "Keep the sensor in the middle", run: () => toggleTool("follow") },
+  { keys: ["h"], about: "The sensor's heading up", run: () => toggleTool("heading_up") },
   { keys: ["r"], about: "Rotate freely", run: () => toggleSetting("view.rotate") },
   { keys: ["t"], about: "Light or dark", run: toggleTheme },
   { keys: ["?"], about: "This help", run: showHelp },

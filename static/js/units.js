@@ -50,8 +50,9 @@ export function percent(share) {
   return `${fixed(shown, shown === 100 ? 0 : 1)}\u2009%`;
 }
 
-export const wholeNumber = (value) =>
-  Number.isFinite(value) ? Math.round(value).toLocaleString("en") : "\u2013";
+const WHOLE = new Intl.NumberFormat("en", { maximumFractionDigits: 0 }); // made once, which takes longer than to use it
+
+export const wholeNumber = (value) => (Number.isFinite(value) ? WHOLE.format(value) : "\u2013");
 
 /** A time in seconds as m:ss.t. */
 export function clock(seconds) {

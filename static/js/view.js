@@ -5,6 +5,7 @@ import { settings } from "./actions.js";
 import { $, el, remake } from "./dom.js";
 import { stroke } from "./figure.js";
 import { parameterRow } from "./parameters.js";
+import { TOOLS } from "./overlay/tools.js";
 import { ownChoices } from "./own.js";
 import { get, on } from "./store.js";
 import { shape } from "./svg.js";
@@ -14,6 +15,7 @@ const OF_MAP = ["pose", "trail", "dead_reckoned", "truth", "occupancy", "walls",
 
 const narrow = matchMedia("(max-width: 1199px)"); // where the room needs the place
 
+const FADES = [[0, "None"], [5, "The last 5"], [20, "The last 20"], [50, "The last 50"]];
 const COLOURS = { plain: "Plain", segment: "By segment", quality: "By quality", range: "By range" };
 
 export function mountView() {
@@ -26,6 +28,7 @@ export function mountView() {
       layerChips(fields, { ofMap: false }),
       selectRow("Point colour", "view.colour", options),
       parameterRow({ ...scale, label: "Ellipse scale", unit: "× σ" }),
+      selectRow("Fading scans", "fade", FADES, TOOLS),
       resetRow(),
     );
     $("rejection-toggle").replaceChildren(switchRow("Show them in the scene", "view.layers.rejected"));

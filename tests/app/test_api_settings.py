@@ -1,9 +1,13 @@
 import json
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from lidarcore_app.pipeline.settings import Settings
+from pydantic import TypeAdapter
 from serving import Server, assert_problem, chosen
+
+from lidarcore.simulation.settings import SimulationSettings
 
 
 def test_a_patch_changes_what_it_names_and_returns_everything(server: Server) -> None:
@@ -13,6 +17,27 @@ def test_a_patch_changes_what_it_names_and_returns_everything(server: Server) ->
     for part in ("extraction", "clusters"):  # there is one sensor
         before[part]["noise"]["sigma_range"] = 0.03
     assert after == before == server.get("/settings")
+
+
+def numbers(schema: dict, node: dict, path: str = "") -> Iterator[tuple[str, str]]:
+    """Path and description of every number below a node of a schema."""
+    kinds = {kind.get("type") for kind in (node, *node.get("anyOf", []))}
+    if kinds & {"number", "integer"}:
+        yield path, node["description"]
+    reference = node.get("$ref", "").removeprefix("#/$defs/")
+    properties = (schema["$defs"][reference] if reference else node).get("properties", {})
+    for name, part in properties.items():
+        yield from numbers(schema, part, f"{path}/{name}")
+
+
+def test_every_number_says_what_more_of_it_does(server: Server) -> None:
+    robot = TypeAdapter(SimulationSettings).json_schema()
+    said = [
+        *numbers(schema := server.get("/settings/schema"), schema),
+        *numbers(robot, robot, "/simulation"),
+    ]
+    assert len(said) > 60
+    assert [path for path, text in said if "More: " not in text and not path.endswith("/seed")] == []
 
 
 def test_null_puts_the_default_back(server: Server) -> None:

@@ -4,7 +4,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from lidarcore_app.scene.palette import METHOD_STYLES, method_rgb
+from lidarcore_app.scene.palette import METHOD_STYLES, PALETTE, method_rgb, stylesheet
+from lidarcore_app.web.server import STATIC
 from numpy.testing import assert_allclose
 
 LEAST = 15  # CIEDE2000
@@ -87,3 +88,14 @@ def test_methods_stand_out_from_the_ground(theme: str) -> None:
 
 def test_every_method_has_a_dash_of_its_own() -> None:
     assert len({style.dash for style in METHOD_STYLES.values()}) == len(METHOD_STYLES)
+
+
+def test_the_page_has_the_colours_of_the_scene_from_one_place() -> None:
+    written = "".join(path.read_text() for path in (STATIC / "css").glob("*.css"))
+    for name, dark in PALETTE["dark"].items():
+        light = PALETTE["light"][name]
+        assert f"--{name}: light-dark({light}, {dark});" in stylesheet()
+        assert light not in written, name
+        assert dark not in written, name
+    assert "var(--wall)" in written
+    assert "var(--trail)" in written

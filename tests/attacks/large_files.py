@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from backports import zstd
+from PIL import Image
 
 from lidarcore import Scan
 from lidarcore.recordings import RecordingWriter
@@ -158,6 +159,23 @@ def database(path: Path, size: int) -> Path:
     return path
 
 
+LANDMARK = b'{"x":1,"y":1,"var_x":1,"cov_xy":0,"var_y":1,"kind":"c"}'
+FEATURE = b'{"geometry":{"type":"Point","coordinates":[1,1]},"properties":{"var_x":1,"cov_xy":0,"var_y":1,"kind":"c"}}'
+MAP_HEAD = b'{"format": "lidarcore landmarks", "version": 1, "unit": "m", "%s": ['
+
+
+def ros_map(suffix: str, mode: str, pixels_per_byte: int) -> Callable[[int], Iterator[bytes]]:
+    """An image of a map, as large as its file may be."""
+
+    def pieces(size: int) -> Iterator[bytes]:
+        side = int((size * pixels_per_byte) ** 0.5)
+        stream = io.BytesIO()
+        Image.new(mode, (side, side)).save(stream, suffix)
+        yield stream.getvalue()
+
+    return pieces
+
+
 FILES: dict[str, Callable[[int], Iterator[bytes]]] = {
     "carmen.log": repeated(CARMEN, FLASER),
     "carmen_beams.log": repeated(CARMEN + FLASER, b"FLASER 100000" + 100_000 * b" 1" + b" 0 0 0 0 0 0 1 h 1\n"),
@@ -185,6 +203,13 @@ FILES: dict[str, Callable[[int], Iterator[bytes]]] = {
     "connections.bag": bag1,
     "channels.mcap": mcap,
     "chunks.mcap": mcap_chunks,
+    "map.json": repeated(MAP_HEAD % b"landmarks", LANDMARK + b",", LANDMARK + b"]}"),
+    "map_nested.json": repeated(MAP_HEAD % b"landmarks" + b"[", b"[],", b"[]]]}"),
+    "map.geojson": repeated(MAP_HEAD % b"features", FEATURE + b",", FEATURE + b"]}"),
+    "map.csv": repeated(b"x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind\n", b"1,1,1,0,1,c\n"),
+    "map.pgm": ros_map("ppm", "L", 1),
+    "map.bmp": ros_map("bmp", "RGB", 1),
+    "map.png": ros_map("png", "L", 1),
 }  # fmt: skip
 
 

@@ -103,6 +103,7 @@ def test_narrow_page_plays_and_selects(phone: Visitor) -> None:
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], theme: str) -> None:
     visitor = visit(1400, 900, theme=theme, reduced_motion="reduce").open()  # else colours would fade in
+    visitor.tolerated.append("404")  # the corner whose sightings it asks for may be gone by then
     wait_until(lambda: visitor.server.get("settings")["view"]["theme"] == theme, "the preference is taken")
     expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)
     visitor.server.patch("settings", MAPPED)
@@ -176,6 +177,48 @@ def test_axe_finds_nothing_on_any_tab(visit: Callable[..., Visitor], theme: str)
         visitor.page.get_by_role("tab", name=panel).click()
         violations = visitor.page.evaluate(LOOK_FOR_VIOLATIONS)
         assert violations == [], panel
+
+
+def test_axe_finds_nothing_on_a_phone(phone: Visitor) -> None:
+    phone.server.patch("settings", MAPPED)
+    phone.await_frame(phone.server.pause())
+    phone.page.locator("#corner-table tbody button").first.dispatch_event("click")
+    expect(phone.page.get_by_role("complementary", name="Inspector")).to_be_visible()
+    phone.page.evaluate(AXE.read_text())
+    assert phone.page.evaluate(LOOK_FOR_VIOLATIONS) == []
+    phone.page.get_by_role("button", name="Fold the inspector").tap()
+    phone.page.get_by_role("button", name="Tools of the view").tap()
+    for panel in PANELS:
+        phone.page.get_by_role("tab", name=panel).tap()
+        assert phone.page.evaluate(LOOK_FOR_VIOLATIONS) == [], panel
+
+
+@pytest.mark.parametrize("width", [1400, 390])
+@pytest.mark.parametrize("path", ["studies", "guide"])
+def test_axe_finds_nothing_on_the_other_pages(visit: Callable[..., Visitor], path: str, width: int) -> None:
+    visitor = visit(width, 844)
+    visitor.page.goto(f"{visitor.server.url}/{path}")
+    expect(visitor.page.get_by_role("heading", level=1)).to_be_visible()
+    visitor.page.evaluate(AXE.read_text())
+    assert visitor.page.evaluate(LOOK_FOR_VIOLATIONS) == []
+
+
+def test_phone_reaches_all_tools_and_keeps_the_view_free(phone: Visitor) -> None:
+    page = phone.page
+    phone.await_frame(phone.server.pause())
+    fit = page.get_by_role("button", name="Fit the room in the view")
+    expect(fit).to_be_hidden()
+    page.get_by_role("button", name="Tools of the view").tap()
+    for name in ("Keep the sensor in the middle", "Measure between corners and walls", "Full screen"):
+        expect(page.get_by_role("button", name=name)).to_be_visible()
+    fit.tap()
+    expect(fit).to_be_hidden()
+    page.locator("#corner-table tbody button").first.dispatch_event("click")
+    card = page.get_by_role("complementary", name="Inspector")
+    expect(card).to_be_visible()
+    assert card.bounding_box()["y"] > page.locator("#stage").bounding_box()["height"] * 1.2
+    page.get_by_role("button", name="Fold the inspector").tap()
+    wait_until(lambda: card.bounding_box()["height"] < 60, "it is folded")
 
 
 def test_page_has_landmarks_and_a_table_that_can_be_read_out(visitor: Visitor) -> None:

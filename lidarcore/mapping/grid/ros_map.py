@@ -1,6 +1,7 @@
 """Occupancy grids as ROS keeps them: an image, and beside it a YAML file that places it (Nav2 map_server)."""
 
 from collections.abc import Callable
+from functools import reduce
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -11,7 +12,7 @@ from pydantic import BaseModel, Field, ValidationError, model_validator
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Ints
 from lidarcore.errors import GridError, MapFileError
 from lidarcore.files import replacing_all
 from lidarcore.mapping.grid.occupancy import FREE, OCCUPIED, UNKNOWN, Cells, OccupancyGrid
@@ -19,6 +20,8 @@ from lidarcore.mapping.grid.occupancy import FREE, OCCUPIED, UNKNOWN, Cells, Occ
 _BLACK, _GREY, _WHITE = 0, 205, 254  # what map_saver writes for occupied, unknown and free cells
 _LONGEST_YAML = 100_000  # bytes
 _MOST_PIXELS = 100_000_000
+_BYTES_OF_MEMORY = 70_000_000  # that an image may take beside four times the size of its file
+_BAND = 1 << 17  # pixels that are looked at together
 _OPAQUE = 255
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -54,8 +57,7 @@ def read_ros_map(path: str | Path) -> OccupancyGrid:
     path = Path(path)
     try:
         header = _read_header(path)
-        shades, opacity = _read_image(_image_beside(path, header.image))
-        cells = _MODES[header.mode](shades, opacity, header)
+        cells = _read_image(_image_beside(path, header.image), header)
         return OccupancyGrid(cells[::-1], header.resolution, np.array(header.origin))
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise MapFileError(f"{path.name} cannot be read: {error}") from error
@@ -126,31 +128,53 @@ def _image_beside(path: Path, name: str) -> Path:
     return image
 
 
-def _read_image(path: Path) -> tuple[Array, Array]:
-    """Brightness and opacity (H, W) from 0 to 1 of an image, the first row at the top."""
+def _read_image(path: Path, header: _Header) -> Cells:
+    """Cells (H, W) of an image, the first row at the top: looked up for each of the shades that occur."""
     try:
         with Image.open(path, formats=("PPM", "PNG", "BMP")) as image:
             width, height = image.size
-            if width * height > _MOST_PIXELS:
-                raise GridError(f"{path.name} has {width} x {height} pixels, more than {_MOST_PIXELS}.")
-            full = 65535.0 if image.mode.startswith("I") else 255.0
-            _check_length(path, width, height, full)
-            if full > _OPAQUE:
-                shades = np.asarray(image, np.float64) / full
-                return shades, np.ones_like(shades)
-            pixels = np.asarray(image.convert("RGBA"), np.float64) / full
-            return pixels[..., :3].mean(axis=-1), pixels[..., 3]
+            is_deep = image.mode.startswith("I")
+            full = 65535 if is_deep else 3 * _OPAQUE
+            _check_size(path, width, height, 6 if is_deep or len(image.getbands()) > 1 else 3)
+            _check_length(path, width, height, is_deep)
+            rows = max(_BAND // width, 1)
+            bands = [(0, top, width, min(top + rows, height)) for top in range(0, height, rows)]
+            found = (np.unique(_codes(image.crop(band), is_deep)) for band in bands)
+            codes = reduce(np.union1d, found)
+            table = np.zeros(codes[-1] + 1, np.int8)
+            table[codes] = _MODES[header.mode]((codes >> 8) / full, (codes & _OPAQUE) / _OPAQUE, header)
+            cells = np.empty((height, width), np.int8)
+            for band in bands:
+                cells[band[1] : band[3]] = table[_codes(image.crop(band), is_deep)]
+            return cells
     except UnidentifiedImageError as error:
         raise MapFileError(f"{path.name} is no PGM, PNG or BMP.") from error
 
 
-def _check_length(path: Path, width: int, height: int, full: float) -> None:
+def _codes(image: Image.Image, is_deep: bool) -> Ints:
+    """Of each pixel (H, W) its brightness, from 0 to 65535 or the sum of its three colours, times 256; its opacity."""
+    pixels: Ints = np.asarray(image if is_deep else image.convert("RGBA")).astype(np.int64)
+    brightness: Ints = pixels.clip(0, 65535) if is_deep else pixels[..., :3].sum(axis=-1)
+    return brightness << 8 | (_OPAQUE if is_deep else pixels[..., 3])
+
+
+def _check_size(path: Path, width: int, height: int, bytes_each: int) -> None:
+    """Raise GridError if the pixels would take more memory than a file of this size may."""
+    most = min((_BYTES_OF_MEMORY + 4 * path.stat().st_size) // bytes_each, _MOST_PIXELS)
+    if width * height > most or width > _BAND:
+        raise GridError(
+            f"{path.name} has {width} x {height} pixels, more than {most}, or than {_BAND} beside each other: use "
+            "larger cells, or a PGM of 8 bits."
+        )
+
+
+def _check_length(path: Path, width: int, height: int, is_deep: bool) -> None:
     """Raise MapFileError if a binary PGM holds less or more than the pixels it announces."""
     with path.open("rb") as file:
         head, size = file.read(1000), path.stat().st_size
     if not head.startswith(b"P5"):
         return
-    wanted = width * height * (2 if full > _OPAQUE else 1)
+    wanted = width * height * (2 if is_deep else 1)
     header = _header_length(head)
     if size != header + wanted:
         raise MapFileError(

@@ -2,7 +2,7 @@
 
 import { $, el, remake } from "../dom.js";
 import { axesOf } from "./ellipses.js";
-import { degrees, duration, metres, millimetres, wholeNumber } from "../units.js";
+import { degrees, duration, fineDegrees, metres, millimetres, wholeNumber } from "../units.js";
 
 const AWAY_PX = 16; // from the pointer
 
@@ -42,7 +42,7 @@ function wallSaid({ id, length, n_points: points, rms, covariance }) {
   return [
     `Wall ${id}`,
     `${metres(length)} m long, ${wholeNumber(points)} points`,
-    `distance ± ${millimetres(Math.sqrt(covariance[1][1]))} mm, direction ± ${degrees(Math.sqrt(covariance[0][0]))}°`,
+    `distance ± ${millimetres(Math.sqrt(covariance[1][1]))} mm, direction ± ${fineDegrees(Math.sqrt(covariance[0][0]))}°`,
     `points scatter by ${millimetres(rms)} mm`,
   ];
 }

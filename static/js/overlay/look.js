@@ -1,7 +1,7 @@
 // How the floor of the world lies in the view: a homography from metres to pixels, so that what is drawn over the scene
 // is where the scene has it, seen from above or at a slant.
 
-const MARGIN = 1.08; // around a room that is looked at
+import { along, axesAt } from "./framing.js";
 
 export class Look {
   /** `matrix` takes (x, y, 1) of the floor, m, to pixels, row by row; the view is `width` by `height` pixels. */
@@ -53,53 +53,56 @@ function inverted([a, b, c, d, e, f, g, h, i]) {
 
 /** A camera of our own, for as long as the scene has none: the floor from above, dragged and zoomed by the pointer. */
 export class PlainCamera {
-  #x = 0;
-  #y = 0;
-  #scale = null; // px/m; null while the room is kept in the view
-  #room = [[-5, 5], [-5, 5]];
+  #held = null; // {middle, scale} as someone moved it; null while all is kept in the view
+  #wanted = { middle: [0, 0], half: 5, up: Math.PI / 2 }; // as framing.js has it
 
-  constructor(stage) {
-    this.stage = stage;
+  /** `size()` tells the view's {width, height} in pixels. */
+  constructor(size) {
+    this.size = size;
   }
 
-  fit(extent) {
-    if (extent) this.#room = extent;
-    this.#scale = null;
+  fit(framing) {
+    if (framing) this.#wanted = framing;
+    this.#held = null;
   }
 
-  follow(extent) {
-    this.#room = extent;
+  look(framing) {
+    this.#wanted = framing;
+    if (this.#held && framing.isFollowed) this.#held.middle = framing.middle;
   }
 
   floorToWindow() {
-    const { clientWidth: width, clientHeight: height } = this.stage;
-    const { x, y, scale } = this.#state();
-    return [scale, 0, width / 2 - scale * x, 0, -scale, height / 2 + scale * y, 0, 0, 1];
+    const { width, height } = this.size();
+    const { middle, scale, axes: [right, up] } = this.#state();
+    return [
+      ...right.map((part) => scale * part), width / 2 - scale * along(right, middle),
+      ...up.map((part) => -scale * part), height / 2 + scale * along(up, middle),
+      0, 0, 1,
+    ];
   }
 
   /** Moves what is seen by so many pixels. */
   drag(dx, dy) {
-    const { x, y, scale } = this.#state();
-    this.#hold(x - dx / scale, y + dy / scale, scale);
+    this.#move(-dx, dy, 1);
   }
 
   /** Enlarges what is seen; the pixel given stays where it is. */
   zoom([X, Y], factor) {
-    const { clientWidth: width, clientHeight: height } = this.stage;
-    const { x, y, scale } = this.#state();
-    const [right, up] = [X - width / 2, height / 2 - Y].map((way) => (way / scale) * (1 - 1 / factor));
-    this.#hold(x + right, y + up, factor * scale);
+    const { width, height } = this.size();
+    const [right, up] = [X - width / 2, height / 2 - Y].map((way) => way * (1 - 1 / factor));
+    this.#move(right, up, factor);
   }
 
-  #hold(x, y, scale) {
-    [this.#x, this.#y, this.#scale] = [x, y, scale];
+  /** Goes so many pixels to the right and up, and enlarges. */
+  #move(right, up, factor) {
+    const { middle, scale, axes } = this.#state();
+    const moved = middle.map((at, i) => at + (right * axes[0][i] + up * axes[1][i]) / scale);
+    this.#held = { middle: moved, scale: factor * scale };
   }
 
   #state() {
-    if (this.#scale !== null) return { x: this.#x, y: this.#y, scale: this.#scale };
-    const { clientWidth: width, clientHeight: height } = this.stage;
-    const [x, y] = this.#room.map(([low, high]) => ({ centre: (low + high) / 2, size: high - low }));
-    const scale = Math.min(width / x.size, height / y.size) / MARGIN;
-    return { x: x.centre, y: y.centre, scale };
+    const { middle, half, up } = this.#wanted;
+    const held = this.#held ?? { middle, scale: this.size().height / (2 * half) };
+    return { ...held, axes: axesAt(up) };
   }
 }

@@ -59,5 +59,9 @@ export function drawMeasure(pen, look, { ring, text, halo }) {
   if (ends.length < 2) return;
   pen.path(ends, { stroke: ring, width: 2 });
   const [[x0, y0], [x1, y1]] = ends;
-  pen.text([(x0 + x1) / 2, (y0 + y1) / 2 - 8], measureText(found), { fill: text, halo, anchor: "middle" });
+  const [x, y] = [(x0 + x1) / 2, (y0 + y1) / 2];
+  const isSteep = Math.abs(y1 - y0) > Math.abs(x1 - x0); // words stand beside the line, on the side with more room
+  const side = x > look.width / 2 ? -1 : 1;
+  const [at, anchor] = isSteep ? [[x + 10 * side, y], side < 0 ? "end" : "start"] : [[x, y - 8], "middle"];
+  pen.text(at, measureText(found), { fill: text, halo, anchor });
 }

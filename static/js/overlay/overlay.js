@@ -36,18 +36,28 @@ export function mountOverlay() {
   set("around", { beams: [], poses: [] });
   on(["frame"], (frame) => (world = worldOf(frame, get("landmarks") ?? new Map())));
   on(["landmarks"], () => get("frame") && (world = worldOf(get("frame"), get("landmarks"))));
-  for (const key of ["frame", "settings", "selection", "wall", "landmarks", "methods", "measure", "place", "around"]) on([key], redraw);
+  for (const key of ["frame", "settings", "selection", "wall", "landmarks", "methods", "measure", "place", "around", "tools"]) on([key], redraw);
   new ResizeObserver(redraw).observe($("stage"));
   $("scene").addEventListener("load", follow);
   follow();
-  mountTools();
+  mountButtons();
 }
 
-/** The buttons of what one can do with the view. */
-function mountTools() {
+/** The buttons of what one can do with the view; the pointer says what each is called. */
+function mountButtons() {
+  for (const button of document.querySelectorAll(".scene-tools button")) button.title = button.getAttribute("aria-label");
+  $("scene-tools").addEventListener("click", ({ target }) => unfold(target.closest("#view-tools") && !isUnfolded()));
   $("measure").addEventListener("click", toggleMeasure);
   $("fullscreen").addEventListener("click", () => (document.fullscreenElement ? document.exitFullscreen() : $("stage").requestFullscreen()));
   for (const kind of ["png", "svg"]) $(`save-${kind}`).addEventListener("click", () => saveView(kind));
+}
+
+const isUnfolded = () => $("scene-tools").classList.contains("open");
+
+/** On a narrow page the buttons are folded into one; each folds them again. */
+function unfold(wanted) {
+  $("scene-tools").classList.toggle("open", Boolean(wanted));
+  $("view-tools").setAttribute("aria-expanded", String(Boolean(wanted)));
 }
 
 /** Draws with the scene's camera, and has its pointer. */
