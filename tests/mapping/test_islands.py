@@ -41,7 +41,7 @@ def around():
 
 def test_an_island_is_found_where_it_lies_however_wrong_the_graph_has_it(around):
     graph, keyframes, islands, poses = around
-    back = poses[60:40:-1] + [0, 0, np.pi]
+    back = poses[60:40:-1] + np.array([0, 0, np.pi])
     ground = len(graph)
     islands.begin(ground)
     found = None
@@ -50,7 +50,8 @@ def test_an_island_is_found_where_it_lies_however_wrong_the_graph_has_it(around)
         found = islands.find(len(graph) - 1)
         if found:
             break
-    assert found is not None and found.island == 0
+    assert found is not None
+    assert found.island == 0
     assert np.abs(pose_difference(found.pose, back[found.k - ground])).max() < 0.06
     assert islands.numbers.tolist() == [0] * ground + [1] * (len(graph) - ground)
 
