@@ -11,7 +11,7 @@ MINUTES ?=
 SEED ?=
 bin := .venv/bin
 
-.PHONY: run test coverage mutants soak lint bench page-speed demo guide docs screenshots lock clean
+.PHONY: run test coverage mutants fuzz soak lint bench page-speed demo guide docs screenshots lock clean
 
 run: .venv/.run
 	$(bin)/lidarcore serve --host $(HOST) --http-port $(PORT) $(if $(RECORDING),"$(RECORDING)")
@@ -27,6 +27,10 @@ coverage: .venv/.dev
 # Whether the tests notice the seeded faults; in about half an hour.
 mutants: .venv/.dev
 	$(bin)/python tests/mutants/run.py
+
+# Broken files, bytes of a sensor, messages and requests, in five minutes unless told otherwise (MINUTES, SEED).
+fuzz: .venv/.dev
+	$(bin)/python tests/fuzz/run.py $(MINUTES:%=--minutes %) $(SEED:%=--seed %)
 
 # Whether a server that runs for an hour (MINUTES) stays as it was after five minutes.
 soak: .venv/.dev

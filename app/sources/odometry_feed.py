@@ -62,11 +62,11 @@ class OdometryFeed:
         Raises MotionError if the clock went back or the pose moved faster than the limits allow; it is left out then.
         The next one may go on from it, which is what follows a reset, or from what came before.
         """
-        now = _Sent(stamp, np.asarray(T_odom_sensor, float))
         with self._lock:
             if not self._admits():
                 self._dropped += 1
                 return False
+            now = _Sent(stamp, np.asarray(T_odom_sensor, float))
             if fault := self._kept and _fault(self._kept[-1], now, limits):
                 if self._suspect is None or _fault(self._suspect, now, limits):
                     self._suspect = now

@@ -5,14 +5,19 @@ Records (what plays, what is recorded, a landmark) are their own schemas: routes
 
 from typing import Annotated, Literal, NotRequired
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from typing_extensions import TypedDict
 
 from ..sources.timed_scan import Position
 
 Pair = tuple[float, float]
 Matrix = tuple[Pair, Pair]
-Matrix3 = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+_THREE = {"type": "array", "minItems": 3, "maxItems": 3}
+# Said by rows that are alike: tuples of tuples are more than some programs understand of JSON schema.
+Matrix3 = Annotated[
+    tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]],
+    WithJsonSchema(_THREE | {"items": _THREE | {"items": {"type": "number"}}}),
+]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]  # of a body: true is none
 Row3 = tuple[Number, Number, Number]
 

@@ -76,7 +76,7 @@ class ViserMount:
             await asyncio.wrap_future(handling)
         except Exception as error:
             logger.warning("viser gave up a client: %r", error)
-            with contextlib.suppress(RuntimeError):
+            with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # it may be gone
                 await websocket.close(1007)
 
 

@@ -17,6 +17,7 @@ import viser
 from lidarcore_app.pipeline.runtime import Runtime
 from lidarcore_app.web.server import ServerOptions, create_app
 from lidarcore_app.web.serving import listen, uvicorn_server
+from lidarcore_app.web.viser_mount import ViserMount
 from waiting import PATIENCE
 from waiting import wait_until as wait_until
 from websockets.sync.client import ClientConnection, connect
@@ -35,9 +36,10 @@ class Server:
     def __init__(self, folder: Path, **options: Any) -> None:
         self._maps = TemporaryDirectory()
         maps = {"map": str(Path(self._maps.name) / "landmarks.db")}
-        app = create_app(ServerOptions(recordings=folder, **maps | options))
+        app = self.app = create_app(ServerOptions(recordings=folder, **maps | options))
         self.runtime: Runtime = app.state.server.runtime
-        self.viser: viser.ViserServer = app.state.server.viser.server
+        self.mount: ViserMount = app.state.server.viser
+        self.viser: viser.ViserServer = self.mount.server
         self.folder = folder
         self._listening = listen("127.0.0.1", 0)
         self.port: int = self._listening.getsockname()[1]

@@ -1,5 +1,8 @@
 """Too much odometry, too large pictures, numbers that are none, and what a refusal says."""
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -7,7 +10,10 @@ from lidarcore_app import isolation
 from lidarcore_app.jobs import map_file
 from lidarcore_app.sources import odometry_feed
 from lidarcore_app.sources.odometry_feed import MOST_PER_SECOND, OdometryFeed
-from serving import Server, assert_problem
+from lidarcore_app.web.routes import map as map_routes
+from reading import peak_memory
+from serving import Server, assert_problem, wait_until
+from waiting import PATIENCE
 
 from lidarcore.localization import LocalizationSettings
 
@@ -95,3 +101,56 @@ def test_a_map_of_more_landmarks_than_allowed_is_refused(shared_server: Server, 
     assert shared_server.http.post("/map", content=head + 1500 * row, **asked).status_code == 201
     problem = assert_problem(shared_server.http.post("/map", content=head + 1501 * row, **asked), 422)
     assert "more than 1500 landmarks" in problem["detail"]
+
+
+def test_heavy_answers_are_made_one_at_a_time_and_light_ones_go_on(
+    shared_server: Server, monkeypatch
+) -> None:
+    head, row = "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind\n", "1,1,1,0,1,corner\n"
+    loaded = shared_server.http.post("/map", params={"format": "csv"}, content=head + row).json()
+    making, most, begun, go_on = 0, 0, threading.Semaphore(0), threading.Event()
+    original = map_routes.export_picture
+
+    def slow(*arguments: object) -> None:
+        nonlocal making, most
+        making += 1
+        most = max(most, making)
+        begun.release()
+        assert go_on.wait(PATIENCE)
+        original(*arguments)
+        making -= 1
+
+    monkeypatch.setattr(map_routes, "export_picture", slow)
+    heavy, asked = shared_server.app.state.heavy, {"format": "png", "session": loaded["id"]}
+    with ThreadPoolExecutor(5) as pool:
+        answers = [pool.submit(shared_server.http.get, "/map", params=asked) for _ in range(5)]
+        try:
+            assert begun.acquire(timeout=PATIENCE)
+            wait_until(lambda: heavy.statistics().tasks_waiting == 4)
+            assert shared_server.get("/version")
+        finally:
+            go_on.set()
+        assert [answer.result().status_code for answer in answers] == 5 * [200]
+    assert most == 1
+
+
+def test_several_large_pictures_take_no_more_memory_than_one(shared_server: Server) -> None:
+    head, rows = (
+        "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind\n",
+        "0,0,1e-4,0,1e-4,corner\n10,10,1e-4,0,1e-4,corner\n",
+    )
+    loaded = shared_server.http.post("/map", params={"format": "csv"}, content=head + rows).json()
+    asked = {"format": "png", "session": loaded["id"], "resolution": 0.004}  # 6 million pixels
+
+    def growth(count: int) -> int:
+        Path("/proc/self/clear_refs").write_text("5")
+        before = peak_memory()
+        with ThreadPoolExecutor(count) as pool:
+            answers = list(pool.map(lambda _: shared_server.http.get("/map", params=asked), range(count)))
+        assert {answer.status_code for answer in answers} == {200}
+        return peak_memory() - before
+
+    growth(1)  # what is loaded for it
+    one = growth(1)
+    assert one > 5_000_000
+    assert growth(4) < 2 * one

@@ -1,10 +1,11 @@
 """The one place that rests on private parts of viser 1.1.1: if a test here fails, the scene is broken."""
 
+import asyncio
 import re
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ClassVar
 
 import httpx
 import msgspec
@@ -14,6 +15,7 @@ import pytest
 import viser
 import zstandard
 from serving import CORNERS, Json, Server, wait_until
+from starlette.websockets import WebSocketDisconnect
 from waiting import PATIENCE
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
@@ -190,6 +192,23 @@ def test_a_broken_message_ends_only_the_client_that_sent_it(server: Server) -> N
             bad.until(lambda: False)
         good.until(lambda: "ReplayDoneMessage" in good.types)
         assert good.read()
+
+
+def test_a_client_that_is_gone_when_it_is_given_up_is_no_error(server: Server, monkeypatch) -> None:
+    class Gone:
+        scope: ClassVar = {"subprotocols": ["viser-v1.1.1"]}
+
+        async def accept(self, subprotocol: str) -> None:
+            pass
+
+        async def close(self, code: int) -> None:
+            raise WebSocketDisconnect(code)
+
+    async def refusing(connection: object) -> None:
+        raise KeyError("look_au")
+
+    monkeypatch.setattr(server.mount, "_handler", refusing)
+    asyncio.run(server.mount._serve(Gone()))
 
 
 @pytest.mark.parametrize("protocols", [["viser-v0.0.1"], None])

@@ -31,7 +31,9 @@ class Load:
     """On the server at an address that plays the sensor."""
 
     def __init__(self, address: str, sensor: EmulatorProcess, seed: int) -> None:
-        self._http = httpx.AsyncClient(base_url=f"{address}/api/v1/", timeout=PATIENCE)
+        # Connections are given up before the server does it, which may be while a request is on its way.
+        limits = httpx.Limits(keepalive_expiry=2)
+        self._http = httpx.AsyncClient(base_url=f"{address}/api/v1/", timeout=PATIENCE, limits=limits)
         self._address, self._sensor, self._rng = address, sensor, random.Random(seed)
         self.done: Counter[str] = Counter()
         self.wrong: Counter[str] = Counter()
@@ -112,7 +114,11 @@ class Load:
 
     async def _ask(self, method: str, path: str, *expected: int, **content: object) -> bool:
         """Whether the answer was the first of those expected; any other than these is noted as wrong."""
-        answer = await self._http.request(method, path, **content)  # type: ignore[arg-type]
+        try:
+            answer = await self._http.request(method, path, **content)  # type: ignore[arg-type]
+        except httpx.TransportError as error:
+            self.wrong[f"{method} {path}: {error!r}"] += 1
+            return False
         self.done[f"{method} {answer.status_code}"] += 1
         if answer.status_code not in expected:
             self.wrong[f"{method} {path}: {answer.status_code} {answer.text[:200]}"] += 1

@@ -12,20 +12,19 @@ import argparse
 import asyncio
 import platform
 import secrets
-import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
 from load import Load
 from measures import Measures
 
-from lidarcore.rplidar.emulator_process import EmulatorProcess
+sys.path.append(str(Path(__file__).parents[1]))
 
-END_WITHIN = 30  # s
+from server_process import server
+
+from lidarcore.rplidar.emulator_process import EmulatorProcess
 
 
 def main() -> None:
@@ -41,7 +40,8 @@ def main() -> None:
     print(f"seed {chosen.seed}; Python {platform.python_version()}, {psutil.cpu_count()} cores", flush=True)
     with tempfile.TemporaryDirectory() as name, EmulatorProcess(moving=True, seed=chosen.seed) as sensor:
         folder = Path(name)
-        with server(folder, sensor.port) as (process, address):
+        options = ("--port", sensor.port, "--set", "navigation.mode=slam")
+        with server(folder, *options) as (process, address):
             load, measures = Load(address, sensor, chosen.seed), Measures(process, chosen.warm)
             asyncio.run(soak(load, measures, chosen.minutes))
         log = (folder / "log").read_text("utf-8")
@@ -59,22 +59,6 @@ async def soak(load: Load, measures: Measures, minutes: float) -> None:
         await measures.take(load.latency, 60 * minutes)
         for task in tasks:
             task.cancel()
-
-
-@contextmanager
-def server(folder: Path, port: str) -> Iterator[tuple[psutil.Process, str]]:
-    """`lidarcore serve` of the sensor at that port, and its address; what it logs goes into a file of the folder."""
-    command = [sys.executable, "-m", "lidarcore_app.cli.main", "serve", "--port", port, "--http-port", "0"]
-    command += ["--recordings", str(folder / "recordings"), "--set", "navigation.mode=slam"]
-    with (folder / "log").open("w") as log:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=log, text=True)
-        assert process.stdout is not None
-        try:
-            address = next(line.split()[-1] for line in process.stdout if "http://" in line)
-            yield psutil.Process(process.pid), address.rstrip("/")
-        finally:
-            process.terminate()
-            process.wait(END_WITHIN)
 
 
 if __name__ == "__main__":
