@@ -11,7 +11,7 @@ MINUTES ?=
 SEED ?=
 bin := .venv/bin
 
-.PHONY: run test coverage mutants fuzz soak lint bench demo guide docs screenshots lock clean
+.PHONY: run test coverage mutants fuzz soak lint bench page-speed demo guide docs screenshots lock clean
 
 run: .venv/.run
 	$(bin)/lidarcore serve --host $(HOST) --http-port $(PORT) $(if $(RECORDING),"$(RECORDING)")
@@ -46,6 +46,11 @@ lint: .venv/.dev
 
 bench: .venv/.run
 	$(bin)/lidarcore bench
+
+# How fast the page is, in two Chromiums; in three minutes.
+page-speed: .venv/.dev
+	@$(browser)
+	$(bin)/python docs/page_speed.py
 
 # The page that explains the ellipses, measured and drawn anew; in a minute or two.
 guide: .venv/.run

@@ -185,7 +185,7 @@ def _server(home: Path) -> Iterator[str]:
         "--http-port",
         str(port),
     ]
-    process = subprocess.Popen([*command, "--recordings", str(home / "recordings")], cwd=home)
+    process = subprocess.Popen([*command, "--recordings", "recordings"], cwd=home)
     url = f"http://127.0.0.1:{port}"
     try:
         _await_frames(url, process)

@@ -1,5 +1,6 @@
 """The command `lidarcore evaluate map`."""
 
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -8,7 +9,10 @@ import typer
 from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
 
 if TYPE_CHECKING:
+    from lidarcore.arrays import Array
     from lidarcore.evaluation.maps.study import MapStudy
+
+_AT_A_SCAN = 0.006  # s, in which a robot hardly moves
 
 
 def evaluate_map(
@@ -82,16 +86,23 @@ def lines(judged: "MapStudy") -> list[tuple[str, str]]:
                 f"allowed its own error (honest: 2.37)",
             ),
         ]
-    if len(judged.relations):
-        mean, worst = judged.relations.mean(axis=0), judged.relations.max(axis=0)
-        told += [
-            (
-                "relations verified by hand",
-                f"{len(judged.relations)}, poses interpolated: mean {mean[0]:.4f} m, {np.rad2deg(mean[1]):.3f} "
-                f"degrees; largest {worst[0]:.3f} m, {np.rad2deg(worst[1]):.2f} degrees",
-            ),
-        ]
+    found = judged.relations
+    at_scans = found[found[:, 2] <= _AT_A_SCAN]
+    if len(found):
+        told.append(("relations verified by hand", f"{len(found)}, poses interpolated: {_errors(found)}"))
+    if 0 < len(at_scans) < len(found):
+        within = f"{1e3 * _AT_A_SCAN:g} ms of a scan"
+        told.append(("  of these", f"{len(at_scans)} with both stamps within {within}: {_errors(at_scans)}"))
     return told
+
+
+def _errors(off: "Array") -> str:
+    """Mean and largest of errors (M, 2 or more) m and rad."""
+    mean, worst = off.mean(axis=0), off.max(axis=0)
+    return (
+        f"mean {mean[0]:.4f} m, {degrees(mean[1]):.3f} degrees; "
+        f"largest {worst[0]:.3f} m, {degrees(worst[1]):.2f} degrees"
+    )
 
 
 def _sigmas(text: str) -> tuple[float, float]:

@@ -16,6 +16,7 @@ from lidarcore.mapping.cells import cells
 
 _GAP = 0.15  # m between two surfaces side by side
 _TILT = 0.1  # rad by which the line of a cell may be turned from the mean of its normals
+_BEYOND = 1e6  # m between two islands
 _OUTLIER = 9.0  # squared standard deviations from which on a patch counts less
 _PASSES = 4  # over a cell, until outliers no longer move its line
 
@@ -50,9 +51,9 @@ class Sums(NamedTuple):
 
 
 def normal_equations(
-    seen: Sightings, poses: Array, size: float, scale: float, unevenness: float
+    seen: Sightings, poses: Array, islands: Ints, size: float, scale: float, unevenness: float
 ) -> tuple[Sums, int]:
-    """The normal equations at poses (K, 3), and how many cells were seen by several keyframes.
+    """The normal equations at poses (K, 3), and how many cells were seen by several keyframes of one island (K,).
 
     The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
     """
@@ -62,7 +63,8 @@ def normal_equations(
         for v in (seen.means, seen.normals)
     ]
     arms, normals = turned
-    order, starts = _ordered(arms + poses[seen.keyframes, :2], normals, size, seen.keyframes)
+    places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
+    order, starts = _ordered(places, normals, size, seen.keyframes)
     K, G = len(poses), len(order)
     D, g = np.zeros((K, 3, 3)), np.zeros((K, 3))
     U, at, groups = np.empty((G, 3, 2)), np.empty((G, 2), np.int64), np.empty((G, 3))

@@ -9,6 +9,7 @@ from lidarcore.arrays import Array
 from lidarcore.geometry import compose, pose_difference, relative
 from lidarcore.mapping.consistency import Loop
 from lidarcore.mapping.front import Tracked
+from lidarcore.mapping.islands import Islands, moved
 from lidarcore.mapping.keyframes import Keyframe
 from lidarcore.mapping.loops import LoopFinder
 from lidarcore.mapping.pose_graph import PoseGraph
@@ -17,6 +18,7 @@ from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.sight import sight
 
 _AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map
+_FOUND = np.diag([0.05, 0.05, 0.02]) ** 2  # how well it is known where an island was found
 _SETTLED = 0.01  # m and rad of the last step, after which the poses are far better than that
 
 
@@ -47,6 +49,7 @@ class BackEnd:
         self.keyframes: list[Keyframe] = []
         self.steps: list[Step] = []
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
+        self._islands = Islands(self.graph, self.keyframes)
 
     def add(self, tracked: Tracked, search: bool = True) -> None:
         """Append a keyframe, and bend the map if it closes loops; search=False leaves them for later."""
@@ -63,23 +66,43 @@ class BackEnd:
         node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
         self.steps.append(Step(tracked.node, node, *tracked.moved))
         self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
+        if tracked.island:
+            self._islands.begin(node)
         if search:
+            self._join(node)
             self._close(self._finder.find(node))
 
     def search_again(self) -> int:
         """Look for loops at all keyframes, now that the map is better. Returns how many were closed."""
-        again = sum(self._close(self._finder.find(node)) for node in range(1, len(self.graph)))
+        again = sum(self._join(node) for node in range(1, len(self.graph)))
+        again += sum(self._close(self._finder.find(node)) for node in range(1, len(self.graph)))
         return again + self._close(self._finder.conclude())
 
     def refine(self) -> Refined:
         """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""
         self.graph.optimize()
         scans = [keyframe.patches for keyframe in self.keyframes]
-        refined = refine(scans, self.graph.poses, self.steps, self._settings.cell)
+        refined = refine(scans, self.graph.poses, self.steps, self._settings.cell, self._islands.numbers)
         self.graph.move(refined.poses)
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
         self.snapshot = Snapshot(tuple(self.keyframes), refined.poses, tuple(self.loops))
         return refined
+
+    def _join(self, k: int) -> int:
+        """Move the newest island to where node k of it was found. Returns how many loops tie it there: 0 or 1."""
+        found = self._islands.find(k)
+        if found is None:
+            return 0
+        numbers, poses = self._islands.numbers, self.graph.poses
+        self.graph.move(moved(poses, np.flatnonzero(numbers == numbers[k]), found))
+        distances = np.hypot(*(poses[:, :2] - found.pose[:2]).T)
+        near = np.flatnonzero((numbers == found.island) & (distances < self._settings.loops.distance))
+        loop = self._finder.tie(near, k, _FOUND)
+        if loop is None:
+            self.graph.move(poses)
+            return 0
+        self._islands.join(found)
+        return self._close([loop])
 
     def _close(self, loops: list[Loop]) -> int:
         for loop in loops:

@@ -7,12 +7,12 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
-from lidarcore.geometry import UncertainPose, compose, relative
+from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
 from lidarcore.localization.deskewing import deskew
 from lidarcore.mapping.correlative import search
 from lidarcore.mapping.laying import Laid, information_of, lay
 from lidarcore.mapping.patches import Patches, patches
-from lidarcore.mapping.settings import FrontSettings
+from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.surfels import Surfels, surfels
 from lidarcore.scan import Scan
 
@@ -22,8 +22,11 @@ _BLIND = 20  # patches: nothing can be laid on a scan that has fewer
 _SLOW = 0.1  # weight of the last scan in the usual time between two
 _FURTHER = 3.0  # times as far is looked for a scan that does not fit
 _SURE = 0.6  # share of a scan on the map from which on it needs no search
+_TURNED = 0.25  # rad from which on two poses are not the same
 _WIDE = 0.5  # m by which a point may be off where the search is needed in any case
 _BETTER = 0.02  # share of a scan by which a pose that was searched for must fit better than that of the guess
+_RIVAL = 0.85  # of the share of a scan on the map, from which on another pose is a rival
+_RIVALS = 3  # other poses that are looked at
 _BAD = 0.4  # share of a scan on the map below which it is a keyframe, as it shows what is new
 
 
@@ -39,6 +42,8 @@ class Tracked:
     scan      as a sensor would see it that stood still at its stamp
     patches   of the scan
     keyframe  whether the scan is one
+    island    True if it lies on nothing known, or fits in several places, and its heading is vague: how it, and what
+              follows, lies to what was before is open
     """
 
     stamp: float
@@ -49,6 +54,7 @@ class Tracked:
     scan: Scan
     patches: Patches
     keyframe: bool
+    island: bool
 
 
 class FrontEnd:
@@ -70,7 +76,7 @@ class FrontEnd:
             seen = patches(scan, self._settings.match)
             self._before = scan.stamp, scan.odometry
             self._begin(seen)
-            return Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, True)
+            return Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, True, False)
         dt, driven = self._since(scan)
         if (
             scan.odometry is not None
@@ -79,15 +85,21 @@ class FrontEnd:
         seen = patches(scan, self._settings.match)
         guess, moved = self._known.compose(driven), self._moved.compose(driven)
         laid = self._laid(seen, guess)
-        on = laid.inliers >= self._settings.inliers
+        rival = self._rival(seen, guess, laid)
+        on = laid.inliers >= self._settings.inliers and rival is None
         tie = self._tie(laid) if on else guess
+        if rival is not None:
+            tie = self._either(laid, rival)
+        island = len(seen.means) >= _BLIND and not on and bool(tie.covariance[2, 2] > VAGUE**2)
         self._motion = relative(self._known.pose, tie.pose) if on else np.zeros(3)
         self._period += _SLOW * (dt - self._period)
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
-        leaves = len(seen.means) >= _BLIND and self._leaves(tie[0], laid.inliers)
-        tracked = Tracked(scan.stamp, self._number - 1, tie, moved, on, scan, seen, leaves)
+        leaves = island or (len(seen.means) >= _BLIND and self._leaves(tie[0], laid.inliers))
+        tracked = Tracked(scan.stamp, self._number - 1, tie, moved, on, scan, seen, leaves, island)
         if leaves:
             self._anchor = compose(self._anchor, tie[0])
+            if island:
+                self._window.clear()
             self._begin(seen)
         return tracked
 
@@ -138,6 +150,32 @@ class FrontEnd:
         start = search(self._map.means, seen.means, x, sigma, match)
         other = lay(self._map, seen, start, x, prior, match.reach)
         return other if other.inliers > laid.inliers + _BETTER else laid
+
+    def _rival(self, seen: Patches, guess: UncertainPose, laid: Laid) -> Array | None:
+        """Another pose (3,) at which a scan that fits badly fits nearly as well, if the guess leaves it open."""
+        assert self._map is not None
+        if not self._settings.inliers <= laid.inliers < _SURE or len(seen.means) < _BLIND:
+            return None
+        match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        sigma, prior, besides = np.sqrt(np.diagonal(P)), information_of(P), laid.pose[None]
+        if 3 * np.hypot(sigma[0], sigma[1]) < _WIDE:
+            return None
+        for _ in range(_RIVALS):
+            start = search(self._map.means, seen.means, x, sigma, match, besides)
+            other = lay(self._map, seen, start, x, prior, match.reach)
+            off = pose_difference(laid.pose, other.pose)
+            if other.inliers >= _RIVAL * laid.inliers and (
+                np.hypot(*off[:2]) > _WIDE or abs(off[2]) > _TURNED
+            ):
+                return other.pose
+            besides = np.concatenate([besides, start[None]])
+        return None
+
+    def _either(self, laid: Laid, rival: Array) -> UncertainPose:
+        """The pose seen from the keyframe, so uncertain that it may be the rival."""
+        pose, P = self._tie(laid)
+        off = pose_difference(relative(self._anchor, rival), pose)
+        return UncertainPose(pose, P + np.outer(off, off) + np.diag(off**2))
 
     def _tie(self, laid: Laid) -> UncertainPose:
         """The pose seen from the keyframe."""

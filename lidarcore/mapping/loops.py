@@ -16,7 +16,7 @@ from lidarcore.mapping.keyframes import Keyframe, joined
 from lidarcore.mapping.laying import Laid, information_of, lay
 from lidarcore.mapping.patches import Patches
 from lidarcore.mapping.pose_graph import PoseGraph
-from lidarcore.mapping.settings import LoopSettings, MatchSettings
+from lidarcore.mapping.settings import VAGUE, LoopSettings, MatchSettings
 from lidarcore.mapping.sight import agreement
 from lidarcore.mapping.surfels import Surfels, surfels
 
@@ -61,6 +61,14 @@ class LoopFinder:
             believed += self._agreeing(k)
         return believed
 
+    def tie(self, nodes: Ints, k: int, P: Array) -> Loop | None:
+        """Node k laid on the one of earlier nodes that saw most of the same; the graph has it right within P (3, 3)."""
+        i = self._best(nodes, k, P) if len(nodes) else None
+        if i is None:
+            return None
+        seen = self._submap(k, range(max(0, k - self._settings.before), k + 1))
+        return next(iter(self._hypotheses(i, k, P, seen)), None)
+
     def conclude(self) -> list[Loop]:
         """Loops to believe of the last nodes, which no further ones will support: all fit, and nothing else does.
 
@@ -90,6 +98,8 @@ class LoopFinder:
         for run in _runs(candidates):
             closest = int(run[np.argmin(distances[run])])
             P = self._graph.relative(closest, k)[1]
+            if P[2, 2] > VAGUE**2:
+                continue
             radius = settings.distance + settings.sigmas * spread(P)
             if distances[closest] > min(radius, settings.farthest) or (np.diagonal(P) < _KNOWN**2).all():
                 continue

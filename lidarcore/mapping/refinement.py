@@ -12,7 +12,7 @@ from scipy.optimize import nnls
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import UncertainPose, pose_difference, relative, relative_jacobians, wrap
 from lidarcore.mapping.adjustment import Sightings, Sums, normal_equations
 from lidarcore.mapping.patches import Patches
@@ -66,15 +66,24 @@ class Refined:
         return self._columns[j][3 * i : 3 * i + 3]
 
 
-def refine(scans: list[Patches], poses: Array, steps: list[Step], size: float, rounds: int = 12) -> Refined:
+def refine(
+    scans: list[Patches],
+    poses: Array,
+    steps: list[Step],
+    size: float,
+    islands: Ints | None = None,
+    rounds: int = 12,
+) -> Refined:
     """Adjust poses (K, 3) that are right to about a cell's `size` m; the first one stays.
 
+    islands (K,) number what each pose is right to: surfaces seen from different islands are different ones.
     steps tie keyframes by odometry or the going on of the motion: what is known where surfaces say nothing.
     """
+    islands = np.zeros(len(poses), np.int64) if islands is None else islands
     seen = _sightings(scans)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
-        sums, cells = normal_equations(seen, poses, size, scale, unevenness)
+        sums, cells = normal_equations(seen, poses, islands, size, scale, unevenness)
         H, g = _with_steps(sums, poses, steps)
         factor = _factor(H)
         step = factor.solve(-g).reshape(-1, 3)
@@ -83,7 +92,7 @@ def refine(scans: list[Patches], poses: Array, steps: list[Step], size: float, r
         scale, unevenness = _measured(sums.groups, cells, len(poses))
         if np.abs(step).max() < _SETTLED:
             break
-    sums, _ = normal_equations(seen, poses, size, scale, unevenness)
+    sums, _ = normal_equations(seen, poses, islands, size, scale, unevenness)
     return Refined(poses, scale, unevenness, _factor(_with_steps(sums, poses, steps)[0]))
 
 

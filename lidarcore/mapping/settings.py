@@ -12,6 +12,8 @@ from lidarcore.fields import number
 from lidarcore.localization.settings import OdometryNoise
 from lidarcore.noise import SensorNoise
 
+VAGUE = 0.5
+"""rad: where a heading is known no better than this, what a sensor should see cannot be told."""
 _CONFIG = ConfigDict(extra="forbid")
 
 

@@ -17,11 +17,15 @@ from lidarcore.localization.ekf.estimate import Instant, no_innovation
 from lidarcore.localization.tracking_result import State, goes_on
 from lidarcore.mapping.front import FrontEnd, Tracked
 from lidarcore.mapping.map_worker import MapPicture, MapWorker
-from lidarcore.mapping.settings import MapperSettings
+from lidarcore.mapping.settings import VAGUE, MapperSettings
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
 _NOT_CONNECTED = "The scan lies on nothing known: odometry or the last motion alone says where the sensor is."
+_SEVERAL = (
+    "After a break without odometry the scan fits in several places: how what is mapped now lies to what was "
+    "mapped before is open until the sensor is seen in a place that it knows."
+)
 _NOT_PLACED = "A map of whole scans begins where its first scan was taken and cannot be moved."
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 _NONE = Points(np.empty((0, 2)), np.eye(2))
@@ -87,8 +91,11 @@ class WholeScans:
             tracked, message = self._front.step(replace(scan, beam_times=None)), goes_on(error)
         here = self._located(tracked)
         self._reckon(scan, here.pose)
-        state: State = "tracking" if tracked.on else "lost"
-        return self._result(tracked.stamp, state, message or (None if tracked.on else _NOT_CONNECTED), here)
+        why = None if tracked.on else _NOT_CONNECTED
+        if here.covariance[2, 2] > VAGUE**2:
+            why = _SEVERAL
+        state: State = "lost" if why else "tracking"
+        return self._result(tracked.stamp, state, message or why, here)
 
     def end(self) -> None:
         """Take no more scans; returns at once."""

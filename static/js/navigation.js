@@ -90,6 +90,7 @@ export function mountNavigation() {
   on(["fields"], (fields) => $("navigation").append(layerChips(fields, { ofMap: true })));
   on(["settings"], ({ navigation: { mode, landmarks } }) => {
     const wholeScans = mode === "slam" && method.value() === "scans";
+    $("map").dataset.of = wholeScans ? "scans" : "landmarks";
     methodRow.hidden = mode === "localize";
     landmarksRow.hidden = mode !== "localize";
     motionRow.hidden = wholeScans;

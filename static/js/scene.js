@@ -91,8 +91,11 @@ function watchSheet() {
 /** The size of the view, and how much of its edges is taken, in pixels; on a narrow page that would leave too little. */
 function measuredSheet() {
   const { clientWidth: width, clientHeight: height } = $("stage");
-  if (narrow.matches) return { width, height, left: 0, right: 0, top: 0, bottom: NUMBERS_PX };
   const [legend, tools, strip] = [$("legend"), $("scene-tools"), $("welcome")];
+  if (narrow.matches) {
+    const bottom = legend.open ? NUMBERS_PX : height - legend.offsetTop;
+    return { width, height, left: 0, right: 0, top: 0, bottom };
+  }
   const left = legend.open ? legend.offsetLeft + legend.offsetWidth : 0;
   const top = strip ? strip.offsetTop + strip.offsetHeight : 0;
   return { width, height, left, right: width - tools.offsetLeft, top, bottom: NUMBERS_PX };

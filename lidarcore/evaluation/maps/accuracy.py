@@ -89,15 +89,20 @@ def read_relations(path: Path) -> Relations:
 
 
 def relation_errors(relations: Relations, stamps: Array, poses: Array, gap: float = 1.0) -> Array:
-    """Errors (M, 2) m and rad of the relations whose stamps lie between poses (N, 3) less than `gap` s apart."""
+    """Errors (M, 3) of the relations whose stamps lie between poses (N, 3) less than `gap` s apart.
+
+    m and rad, and s from the farther one of both stamps to the next pose: farther away, they are mostly those of
+    interpolating a motion that was not even.
+    """
     track, errors = PoseTrack(stamps, poses), []
     sorted_stamps = np.sort(stamps)
     for (first, second), known_to_be in zip(relations.stamps, relations.poses, strict=True):
         a, b = (track.at(t) if _covered(sorted_stamps, t, gap) else None for t in (first, second))
         if a is not None and b is not None:
             off = relative(known_to_be, relative(a, b))
-            errors.append([np.hypot(off[0], off[1]), abs(off[2])])
-    return np.array(errors).reshape(-1, 2)
+            away = max(float(np.abs(sorted_stamps - t).min()) for t in (first, second))
+            errors.append([np.hypot(off[0], off[1]), abs(off[2]), away])
+    return np.array(errors).reshape(-1, 3)
 
 
 def _covered(stamps: Array, t: float, gap: float) -> bool:

@@ -35,7 +35,7 @@ class MapStudy:
     pairs       (M,) m and rad errors (M, 2) of relative poses, within 3 m and more than 30 scans apart
     normalised  (S,) squared errors of pairs of keyframes in units of their claimed covariance, 3 dof
     allowed     (S,) the same, the reference being allowed its own error
-    relations   (R, 2) m and rad errors of relations verified by hand
+    relations   (R, 3) m and rad errors of relations verified by hand, and s from their stamps to the next scan
     """
 
     scans: int
@@ -100,7 +100,7 @@ def study(
         pairs = _lengths(relative_errors(poses, reference, close_pairs(reference)))
         normalised, allowed = _normalised(mapper, reference[numbers], own)
         wrong = _wrong(mapper, reference[numbers])
-    found = np.empty((0, 2)) if relations is None else relation_errors(relations, stamps, poses)
+    found = np.empty((0, 3)) if relations is None else relation_errors(relations, stamps, poses)
     return MapStudy(
         len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, megabytes,
         pairs, normalised, allowed, found,

@@ -45,7 +45,7 @@ export function mountOverlay() {
 
 /** The buttons of what one can do with the view; the pointer says what each is called. */
 function mountButtons() {
-  for (const button of document.querySelectorAll(".scene-tools button")) button.title = button.getAttribute("aria-label");
+  for (const button of document.querySelectorAll(".scene-tools button, .bar button.icon")) button.title = button.getAttribute("aria-label");
   $("scene-tools").addEventListener("click", ({ target }) => unfold(target.closest("#view-tools") && !isUnfolded()));
   $("measure").addEventListener("click", toggleMeasure);
   $("fullscreen").addEventListener("click", () => (document.fullscreenElement ? document.exitFullscreen() : $("stage").requestFullscreen()));

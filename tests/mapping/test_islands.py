@@ -1,0 +1,87 @@
+"""What is mapped after the sensor may have been carried elsewhere: a simulated building, and a real one."""
+
+import numpy as np
+import pytest
+from mapping_scenes import BUILDING, NOISE, full_scan, way
+
+from lidarcore import open_recording
+from lidarcore.evaluation.maps.study import prepared, study
+from lidarcore.geometry import compose, pose_difference
+from lidarcore.mapping import MapperSettings, MatchSettings
+from lidarcore.mapping.islands import Islands, moved
+from lidarcore.mapping.keyframes import Keyframe
+from lidarcore.mapping.patches import patches
+from lidarcore.mapping.pose_graph import PoseGraph
+from lidarcore.mapping.sight import sight
+from lidarcore.simulation import World
+
+VAGUE = np.diag([1.0, 1.0, 3.0]) ** 2
+WRONG = np.array([4.0, -3.0, 2.8])  # where the graph takes the island's own frame to lie
+
+
+def charted(graph, keyframes, world, poses, at):
+    """Append what is seen at poses (K, 3) as nodes at other poses (K, 3)."""
+    rng = np.random.default_rng(len(keyframes))
+    for seen_from, pose in zip(poses, at, strict=True):
+        scan = full_scan(world, seen_from, NOISE, rng)
+        keyframes.append(Keyframe(scan, patches(scan, MatchSettings(noise=NOISE)), sight(scan)))
+        if len(keyframes) > 1:
+            node = graph.add(pose)
+            graph.connect(node - 1, node, [0.3, 0, 0], VAGUE)
+
+
+@pytest.fixture
+def around():
+    """A way around the building, mapped, and its poses seen from the first."""
+    poses = way(0.3, 1.0)
+    graph, keyframes = PoseGraph(poses[0]), []
+    charted(graph, keyframes, BUILDING, poses, poses)
+    return graph, keyframes, Islands(graph, keyframes), poses
+
+
+def test_an_island_is_found_where_it_lies_however_wrong_the_graph_has_it(around):
+    graph, keyframes, islands, poses = around
+    back = poses[60:40:-1] + np.array([0, 0, np.pi])
+    ground = len(graph)
+    islands.begin(ground)
+    found = None
+    for pose in back:
+        charted(graph, keyframes, BUILDING, pose[None], compose(WRONG, pose)[None])
+        found = islands.find(len(graph) - 1)
+        if found:
+            break
+    assert found is not None
+    assert found.island == 0
+    assert np.abs(pose_difference(found.pose, back[found.k - ground])).max() < 0.06
+    assert islands.numbers.tolist() == [0] * ground + [1] * (len(graph) - ground)
+
+    after = moved(graph.poses, np.arange(ground, len(graph)), found)
+    assert after[:ground] == pytest.approx(graph.poses[:ground])
+    off = pose_difference(after[ground:], back[: len(graph) - ground])
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.3
+    islands.join(found)
+    assert not islands.numbers.any()
+    assert islands.find(len(graph) - 1) is None
+
+
+def test_an_island_in_another_building_is_found_nowhere(around):
+    graph, keyframes, islands, poses = around
+    elsewhere = World(BUILDING.walls * [0.7, 1.4] + [0, 20])
+    there = poses[10:34] * [0.7, 1.4, 1] + [0, 20, 0]
+    islands.begin(len(graph))
+    for pose in there:
+        charted(graph, keyframes, elsewhere, pose[None], pose[None])
+        assert islands.find(len(graph) - 1) is None
+
+
+@pytest.mark.real_data
+def test_a_real_building_without_odometry_where_a_scan_fits_in_two_places(data):
+    """In Freiburg's building 101 a scan after a break fits in two places, 6.8 m and half a turn from each other.
+
+    Taken for the wrong one, relative poses were 4.7 m off in the mean.
+    """
+    scans = list(open_recording(data / "carmen_radish_corrected" / "freiburg-101-corrected.log.gz"))
+    found = study(*prepared(scans, "none", 0), MapperSettings())
+    assert found.wrong == 0
+    assert found.pairs[:, 0].mean() < 0.045
+    assert found.tracked == found.scans - 1
