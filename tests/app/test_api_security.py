@@ -46,7 +46,7 @@ WEBSOCKETS = [("/api/v1/stream", None), ("/viser", ["viser-v1.1.1"])]
 
 
 @pytest.mark.parametrize(("method", "path", "body"), MUTATIONS)
-@pytest.mark.parametrize("origin", [EVIL, "null", "http://127.0.0.1:1", "https://localhost"])
+@pytest.mark.parametrize("origin", [EVIL, "null", "http://127.0.0.1:1", "https://localhost", "http://["])
 def test_a_page_of_another_origin_changes_nothing(
     shared_server: Server, method: str, path: str, body: object, origin: str
 ) -> None:
