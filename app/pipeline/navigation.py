@@ -86,9 +86,9 @@ class Navigation:
 
     @property
     def trajectory(self) -> list[TrackedPose]:
-        """All poses of this run that are kept."""
-        with self._lock:
-            return list(self._run.trails.trajectory) if self._run else []
+        """All poses of this run that are kept. As with the others below, who asks does not wait for a scan."""
+        run = self._run
+        return list(run.trails.trajectory.copy()) if run else []  # one step, whoever appends meanwhile
 
     @property
     def paths(self) -> Paths:

@@ -154,3 +154,10 @@ def test_several_large_pictures_take_no_more_memory_than_one(shared_server: Serv
     one = growth(1)
     assert one > 5_000_000
     assert growth(4) < 2 * one
+
+
+def test_the_trajectory_does_not_wait_for_a_scan_that_takes_long(shared_server: Server) -> None:
+    """A worker that is busy all the time gives up its lock for moments only, which others need not get."""
+    with shared_server.runtime.navigation._lock:
+        for path in ("/trajectory", "/localization", "/pose?"):
+            assert shared_server.http.get(path, timeout=10).status_code in (200, 404)
