@@ -233,6 +233,6 @@ def test_health_version_and_methods_say_what_is(server: Server) -> None:
 def test_the_page_and_its_files_are_served(shared_server: Server) -> None:
     page = httpx.get(f"{shared_server.url}/")
     assert page.headers["content-type"].startswith("text/html")
-    assert "viser/" in page.text
+    assert '<iframe id="scene"' in page.text
     for path in set(re.findall(r"(?:src|href)=\"(static/[^\"]+)\"", page.text)):
         assert httpx.get(f"{shared_server.url}/{path}").status_code == 200, path
