@@ -2,7 +2,6 @@
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -11,7 +10,6 @@ from lidarcore_app.jobs import map_file
 from lidarcore_app.sources import odometry_feed
 from lidarcore_app.sources.odometry_feed import MOST_PER_SECOND, OdometryFeed
 from lidarcore_app.web.routes import map as map_routes
-from reading import peak_memory
 from serving import Server, assert_problem, wait_until
 from waiting import PATIENCE
 
@@ -132,28 +130,6 @@ def test_heavy_answers_are_made_one_at_a_time_and_light_ones_go_on(
             go_on.set()
         assert [answer.result().status_code for answer in answers] == 5 * [200]
     assert most == 1
-
-
-def test_several_large_pictures_take_no_more_memory_than_one(shared_server: Server) -> None:
-    head, rows = (
-        "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind\n",
-        "0,0,1e-4,0,1e-4,corner\n10,10,1e-4,0,1e-4,corner\n",
-    )
-    loaded = shared_server.http.post("/map", params={"format": "csv"}, content=head + rows).json()
-    asked = {"format": "png", "session": loaded["id"], "resolution": 0.004}  # 6 million pixels
-
-    def growth(count: int) -> int:
-        Path("/proc/self/clear_refs").write_text("5")
-        before = peak_memory()
-        with ThreadPoolExecutor(count) as pool:
-            answers = list(pool.map(lambda _: shared_server.http.get("/map", params=asked), range(count)))
-        assert {answer.status_code for answer in answers} == {200}
-        return peak_memory() - before
-
-    growth(1)  # what is loaded for it
-    one = growth(1)
-    assert one > 5_000_000
-    assert growth(4) < 2 * one
 
 
 def test_the_trajectory_does_not_wait_for_a_scan_that_takes_long(shared_server: Server) -> None:
