@@ -9,7 +9,7 @@ import typer
 from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
 
 if TYPE_CHECKING:
-    from lidarcore.arrays import Array
+    from lidarcore import Array
     from lidarcore.evaluation.maps.study import MapStudy
 
 _AT_A_SCAN = 0.006  # s, in which a robot hardly moves
