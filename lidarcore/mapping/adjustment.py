@@ -123,10 +123,7 @@ def _sum(
         nx, ny = _line(keyframes, poses, arms, normals, low, high, r, t)
         _weigh(keyframes, variances, scale, shared, low, high, weights)
         a, b = _fit(keyframes, variances, scale, shared, low, high, r, t, weights, N, m)
-        det = N[0, 0] * N[1, 1] - N[0, 1] * N[0, 1]
-        l00 = np.sqrt(N[1, 1] / det)  # N^-1 = L L^T
-        l10 = -N[0, 1] / det / l00
-        l11 = np.sqrt(max(N[0, 0] / det - l10 * l10, 0.0))
+        det, l00, l10, l11 = _inverse_root(N)
         i = low
         while i < high:
             k, j = keyframes[i], i
@@ -158,6 +155,15 @@ def _sum(
             i = j
         lines += 1
     return number, lines
+
+
+@kernel
+def _inverse_root(N: Array) -> tuple[float, float, float, float]:
+    """Determinant of N (2, 2), and the lower triangle of L, where N^-1 = L L^T."""
+    det = N[0, 0] * N[1, 1] - N[0, 1] * N[0, 1]
+    l00 = np.sqrt(N[1, 1] / det)
+    l10 = -N[0, 1] / det / l00
+    return det, l00, l10, np.sqrt(max(N[0, 0] / det - l10 * l10, 0.0))
 
 
 @kernel

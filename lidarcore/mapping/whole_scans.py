@@ -22,9 +22,9 @@ from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
 _NOT_CONNECTED = "The scan lies on nothing known: odometry or the last motion alone says where the sensor is."
-_SEVERAL = (
-    "After a break without odometry the scan fits in several places: how what is mapped now lies to what was "
-    "mapped before is open until the sensor is seen in a place that it knows."
+_ISLAND = (
+    "After a break without odometry the sensor may be in several places: what is mapped now is joined to what was "
+    "mapped before once it comes to a place that it has seen."
 )
 _NOT_PLACED = "A map of whole scans begins where its first scan was taken and cannot be moved."
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
@@ -93,7 +93,7 @@ class WholeScans:
         self._reckon(scan, here.pose)
         why = None if tracked.on else _NOT_CONNECTED
         if here.covariance[2, 2] > VAGUE**2:
-            why = _SEVERAL
+            why = _ISLAND
         state: State = "lost" if why else "tracking"
         return self._result(tracked.stamp, state, message or why, here)
 

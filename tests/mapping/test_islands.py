@@ -1,5 +1,7 @@
 """What is mapped after the sensor may have been carried elsewhere: a simulated building, and a real one."""
 
+from contextlib import closing
+
 import numpy as np
 import pytest
 from mapping_scenes import BUILDING, NOISE, full_scan, way
@@ -7,7 +9,7 @@ from mapping_scenes import BUILDING, NOISE, full_scan, way
 from lidarcore import open_recording
 from lidarcore.evaluation.maps.study import prepared, study
 from lidarcore.geometry import compose, pose_difference
-from lidarcore.mapping import MapperSettings, MatchSettings
+from lidarcore.mapping import MapperSettings, MatchSettings, WholeScans
 from lidarcore.mapping.islands import Islands, moved
 from lidarcore.mapping.keyframes import Keyframe
 from lidarcore.mapping.patches import patches
@@ -72,6 +74,14 @@ def test_an_island_in_another_building_is_found_nowhere(around):
     for pose in there:
         charted(graph, keyframes, elsewhere, pose[None], pose[None])
         assert islands.find(len(graph) - 1) is None
+
+
+@pytest.mark.real_data
+def test_the_live_pose_is_lost_while_nobody_knows_how_an_island_lies(data):
+    scans = list(open_recording(data / "carmen_radish_corrected" / "freiburg-101-corrected.log.gz"))
+    with closing(WholeScans()) as live:
+        states = [live.step(live.deskewed(scan)).state for scan in prepared(scans, "none", 0)[0][:40]]
+    assert states == 32 * ["tracking"] + 8 * ["lost"]
 
 
 @pytest.mark.real_data
