@@ -190,6 +190,7 @@ SESSION = {
     "started": 1795255000.0,
     "ended": None,
     "landmarks": 27,
+    "walls": 0,
 }
 SETTINGS_PATCH = {"extraction": {"fitter": "wctls", "min_points": 8}, "view": {"compare": True}}
 
