@@ -12,7 +12,7 @@ from lidarcore.mapping.back import BackEnd
 from lidarcore.mapping.front import Tracked
 from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
 from lidarcore.mapping.settings import MapperSettings
-from lidarcore.mapping.walls import Walls, find_walls
+from lidarcore.mapping.walls import WallIds, Walls, find_walls
 from lidarcore.mapping.worker import Worker
 from lidarcore.settings import ExtractionSettings
 
@@ -49,6 +49,7 @@ class MapWorker:
         self._extraction = extraction
         self._back = BackEnd(settings)
         self._builder, self._drawn = GridBuilder(GridSettings(most_cells=_MOST_CELLS)), 0
+        self._wall_ids = WallIds()
         self._next_picture = self._next_walls = 0.0
         self._failing = False
         self._worker: Worker[Tracked] = Worker(self._work, "map", idle=_EVERY)
@@ -120,4 +121,5 @@ class MapWorker:
     def _walls(self, grid: OccupancyGrid) -> Walls:
         graph, scans = self._back.graph, [keyframe.scan for keyframe in self._back.keyframes]
         covariances = np.array([graph.covariance(k) for k in range(len(scans))])
-        return find_walls(scans, graph.poses, covariances, grid, extraction=self._extraction)
+        found = find_walls(scans, graph.poses, covariances, grid, extraction=self._extraction)
+        return self._wall_ids.identified(found)

@@ -76,6 +76,12 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
     grid = read_ros_map(tmp_path / "map" / "map.yaml")
     assert (shades_of(grid) == 254).sum() * grid.resolution**2 > 35
 
+    (first,) = (wall for wall in walls if wall["id"] == 0)
+    (later,) = (wall for wall in driving.get("/walls")["walls"] if wall["id"] == 0)
+    assert later["count"] > first["count"]
+    assert np.cos(later["alpha"] - first["alpha"]) > 0.99
+    assert later["r"] == pytest.approx(first["r"], abs=0.1)
+
     before = driving.next_frame()
     where = before["localization"]
     assert where["state"] == "tracking"

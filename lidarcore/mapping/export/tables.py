@@ -51,7 +51,13 @@ def _row(walls: Walls | None, i: int) -> Row:
     numbers += [C[0, 0], C[0, 1], C[1, 1], walls.length_variance[i]]
     flags = np.concatenate([walls.ended[i], walls.in_corner[i]]).astype(int).tolist()
     seen = [float(walls.first_seen[i]), float(walls.last_seen[i]), int(walls.count[i])]
-    return dict(zip(names, [i, *(float(f"{value:.9g}") for value in numbers), *flags, *seen], strict=True))
+    return dict(
+        zip(
+            names,
+            [int(walls.ids[i]), *(float(f"{value:.9g}") for value in numbers), *flags, *seen],
+            strict=True,
+        )
+    )
 
 
 def _wall_feature(walls: Walls, i: int) -> Row:
@@ -63,7 +69,7 @@ def _wall_feature(walls: Walls, i: int) -> Row:
 def _corner_feature(walls: Walls, k: int) -> Row:
     (v_x, c_xy), (_, v_y) = walls.corners.covariance[k].tolist()
     properties = {"var_x_m2": v_x, "cov_xy_m2": c_xy, "var_y_m2": v_y}
-    properties["walls"] = [f"wall-{i}" for i in walls.corners.walls[k].tolist()]
+    properties["walls"] = [f"wall-{id}" for id in walls.ids[walls.corners.walls[k]].tolist()]
     return _feature(f"corner-{k}", "Point", walls.corners.xy[k].round(9).tolist(), properties)
 
 

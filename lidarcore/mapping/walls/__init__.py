@@ -1,5 +1,6 @@
 """Walls of a map: the segments of all keyframes as lines with ends, corners and covariances."""
 
+from lidarcore.mapping.walls.identity import WallIds
 from lidarcore.mapping.walls.query import along, distances, in_box, nearest
 from lidarcore.mapping.walls.settings import WallSettings
 from lidarcore.mapping.walls.spread import Spread, common_spread, joint_spread
@@ -8,6 +9,7 @@ from lidarcore.mapping.walls.walls import WallCorners, Walls, find_walls
 __all__ = [
     "Spread",
     "WallCorners",
+    "WallIds",
     "WallSettings",
     "Walls",
     "along",

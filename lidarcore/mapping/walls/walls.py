@@ -16,6 +16,7 @@ from lidarcore.mapping.walls.model import WallModel, corner_rows, wall_model
 from lidarcore.mapping.walls.parts import Part, find_parts
 from lidarcore.mapping.walls.pieces import collect_pieces
 from lidarcore.mapping.walls.settings import WallSettings
+from lidarcore.mapping.walls.sightings import Sightings
 from lidarcore.mapping.walls.spread import Spread, common_spread
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
@@ -27,7 +28,7 @@ class WallCorners:
 
     xy          (C, 2) m
     covariance  (C, 2, 2) m²
-    walls       (C, 2) which two
+    walls       (C, 2) which two, by their place among the walls
     rows        (2 C, 4 W) how they follow from what was estimated of walls, for `WallModel.covariance`
     """
 
@@ -48,6 +49,7 @@ class WallCorners:
 class Walls:
     """W walls in the world, each a surface seen from one side: x cos(alpha) + y sin(alpha) = r.
 
+    ids              (W,) which is which; those of a map that grows stay, see `WallIds`
     alpha            (W,) rad, in (-pi, pi]
     r                (W,) m, >= 0
     line_covariance  (W, 2, 2) of (alpha, r)
@@ -62,8 +64,10 @@ class Walls:
     count            (W,) number of keyframes that saw it
     corners          where walls meet
     model            what the covariances come from, for what walls have in common
+    sightings        what of which segments each wall was seen by
     """
 
+    ids: Ints
     alpha: Array
     r: Array
     line_covariance: Array
@@ -78,6 +82,7 @@ class Walls:
     count: Ints
     corners: WallCorners
     model: WallModel = field(repr=False)
+    sightings: Sightings = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.alpha)
@@ -94,7 +99,7 @@ def find_walls(
     settings: WallSettings | None = None,
     extraction: ExtractionSettings | None = None,
 ) -> Walls:
-    """The walls that keyframes saw and the grid still has.
+    """The walls that keyframes saw and the grid still has, with ids from 0 on.
 
     scans at poses (K, 3), T_world_sensor; spread says how the poses err together, or is their covariances (K, 3, 3).
     """
@@ -118,6 +123,7 @@ def find_walls(
     length, variance = _lengths(xy, covariances[:, 2:, 2:])
     alpha, r = _hesse(parts)
     return Walls(
+        np.arange(len(parts)),
         alpha,
         r,
         covariances[:, :2, :2],
@@ -132,6 +138,7 @@ def find_walls(
         np.array([len(k) for k in seen], np.int64),
         _corners(parts, meetings, model),
         model,
+        Sightings.of(pieces, parts),
     )
 
 
