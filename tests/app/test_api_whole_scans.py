@@ -87,8 +87,10 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
     same = [(wall, later[wall["id"]]) for wall in walls if wall["id"] in later]
     assert len(same) > len(walls) / 2
     for first, then in same:
-        assert np.cos(then["alpha"] - first["alpha"]) > 0.95
-        assert then["r"] == pytest.approx(first["r"], abs=0.3)
+        way, way_then = (np.subtract(wall["end"], wall["start"]) / wall["length"] for wall in (first, then))
+        middle = np.add(first["start"], first["end"]) / 2
+        assert way @ way_then > 0.9
+        assert abs(np.subtract(middle, then["start"]) @ [-way_then[1], way_then[0]]) < 0.3
 
     before = driving.next_frame()
     where = before["localization"]
