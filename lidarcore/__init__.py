@@ -51,6 +51,7 @@ __all__ = [
     "SensorNoise",
     "TopicError",
     "Tracker",
+    "body_mask",
     "compare",
     "errors",
     "extract",

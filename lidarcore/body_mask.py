@@ -1,13 +1,20 @@
 """The robot's own body in the scan: sectors in which what is near is left out, before everything else."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MaskError
+from lidarcore.fields import number
 from lidarcore.scan import Scan
+
+MOST_SECTORS = 16  # of a mask
+MOST_BYTES = 1 << 13  # of a mask as text
 
 _BINS = 180  # of bearings in a whole turn
 _LEAST = 20  # scans
@@ -15,24 +22,26 @@ _SHARE = 0.9  # of the scans in which a body is in its place
 _STEADY = 0.04  # m between the 5th and the 95th of 100 ranges to a body, at most
 _MOVING = 0.3  # m between the same of the room, in half of all bearings at least
 _CLEARANCE = 0.05  # m beyond the farthest return from the body
+_TURN = 6.3  # rad, and a little
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True)
 class Sector:
     """Bearings from `first` counter-clockwise to `last` (rad, sensor frame), and how far the mask reaches (m).
 
-    Raises MaskError if a number is not finite or the reach is not positive.
+    Raises pydantic.ValidationError, a ValueError that names the field and its bounds.
     """
 
-    first: float
-    last: float
-    reach: float
-
-    def __post_init__(self) -> None:
-        if not (np.isfinite([self.first, self.last, self.reach]).all() and self.reach > 0):
-            raise MaskError(
-                f"{self} is no sector: give two bearings (rad) and a reach (m) above 0, all finite."
-            )
+    first: Annotated[
+        float, number(-_TURN, _TURN, "rad", "bearing at which it begins. More: it begins farther to the left")
+    ]
+    last: Annotated[
+        float,
+        number(-_TURN, _TURN, "rad", "bearing at which it ends, to the left of first. More: it is wider"),
+    ]
+    reach: Annotated[
+        float, number(0.01, 10.0, "m", "what is nearer is left out. More: more of the room goes, too")
+    ]
 
     def holds(self, bearings: Array) -> "np.ndarray":
         """(N,) true for bearings (N,) rad within the sector; the whole turn if first and last are a turn apart."""
@@ -43,6 +52,25 @@ class Sector:
             if whole
             else (bearings - self.first) % (2 * np.pi) <= width % (2 * np.pi)
         )
+
+
+Mask = Annotated[tuple[Sector, ...], Field(max_length=MOST_SECTORS)]
+_Mask = TypeAdapter[tuple[Sector, ...]](Mask)
+
+
+def as_text(mask: Iterable[Sector]) -> str:
+    """A mask as JSON, for the metadata of a recording."""
+    return _Mask.dump_json(tuple(mask)).decode()
+
+
+def from_text(text: str) -> tuple[Sector, ...]:
+    """The mask that `as_text` wrote. Raises MaskError if the text is none, or too long."""
+    if len(text) > MOST_BYTES:
+        raise MaskError(f"The mask takes {len(text)} bytes, more than {MOST_BYTES}.")
+    try:
+        return _Mask.validate_json(text)
+    except ValidationError as error:
+        raise MaskError(f"The mask is not valid: {error.errors()[0]['msg']}.") from error
 
 
 def masked(scan: Scan, sectors: Iterable[Sector]) -> Scan:
@@ -75,7 +103,12 @@ def suggest_mask(scans: Sequence[Scan], farthest: float = 1.0) -> tuple[Sector, 
         raise MaskError(
             "The sensor hardly moved: drive and turn, so that only its own body stays where it is."
         )
-    return _sectors(body, last)
+    sectors = _sectors(body, last)
+    if len(sectors) > MOST_SECTORS:
+        raise MaskError(
+            f"{len(sectors)} places stay where they are, more than the {MOST_SECTORS} sectors of a mask: drive farther."
+        )
+    return sectors
 
 
 def _nearest(scan: Scan) -> Array:

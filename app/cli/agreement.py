@@ -46,9 +46,10 @@ def agreement(
     if output is not None:
         consistency_tables.check(output, (".json",))
         check_folder(output)
-    extraction = settings_from(settings, set_).extraction
+    chosen = settings_from(settings, set_)
     with counting("pairs of stations") as tell:
-        found = study(named_stations(recordings, topic), extraction, calibrated=not given, tell=tell)
+        stations = named_stations(recordings, topic, chosen.sensor.mask)
+        found = study(stations, chosen.extraction, calibrated=not given, tell=tell)
     table = Table(title="Differences between neighbouring stations", title_justify="left")
     for heading in (
         "claims",

@@ -54,15 +54,16 @@ def calibrate(
     if output is not None:
         consistency_tables.check(output, (".json",))
         check_folder(output)
-    usual = settings_from(settings, None).extraction.noise
-    result = run(islice(open_recording(recording, topic), skip, None if scans is None else skip + scans))
+    chosen = settings_from(settings, None)
+    opened = open_recording(recording, topic, chosen.sensor.mask)
+    result = run(islice(opened, skip, None if scans is None else skip + scans))
     found = report(result)
     if json:
         typer.echo(TypeAdapter(CalibrationReport).dump_json(found, indent=1))
     else:
         _show(Console(), found)
     if output is not None:
-        _write(output, result, usual)
+        _write(output, result, chosen.extraction.noise)
 
 
 def _write(output: Path, result: "Calibration", usual: "SensorNoise") -> None:

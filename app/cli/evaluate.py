@@ -154,10 +154,10 @@ def repeatability(
     if output is not None:
         consistency_tables.check(output)
         check_folder(output)
-    extraction = settings_from(settings, set_).extraction
+    chosen = settings_from(settings, set_)
     study = Repeatability(scans, [name.strip() for name in methods.split(",")] if methods else FITTERS)
-    for scan in islice(open_recording(recording, topic), skip, skip + scans):
-        study.add(compare(scan, extraction, study.methods))
+    for scan in islice(open_recording(recording, topic, chosen.sensor.mask), skip, skip + scans):
+        study.add(compare(scan, chosen.extraction, study.methods))
     summary = study.summary()
     if not any(found.scatter().is_judged for found in (study.corners, study.walls)):
         raise EvaluationError(MOVES if study.moved else f"Nothing can be judged. {summary.message}")

@@ -43,14 +43,14 @@ def evaluate_map(
 
     from .map_run import mapper_settings
 
-    chosen = mapper_settings(settings_from(settings, set_))
+    chosen = settings_from(settings, set_)
     verified = None if relations is None else read_relations(relations)
-    scans = list(open_recording(recording, topic))
+    scans = list(open_recording(recording, topic, chosen.sensor.mask))
     sigmas = _sigmas(own)
     for number in range(seed, seed + seeds):
         given, reference = prepared(scans, odometry, number)
         with counting("scans") as count:
-            judged = study(given, reference, chosen, verified, sigmas, count)
+            judged = study(given, reference, mapper_settings(chosen), verified, sigmas, count)
         if seeds > 1:
             typer.echo(f"seed {number}")
         for name, value in lines(judged):

@@ -30,6 +30,8 @@ def summarise(recording: Recording) -> Iterator[tuple[str, str]]:
     yield "returns", f"{100 * valid / sum(beams):.1f} %"
     yield "ranges", f"{shortest:.3f} to {longest:.3f} m" if valid else "none"
     yield "odometry", f"in {odometry} scans" if odometry else "none"
+    if recording.mask:
+        yield "robot's own body", f"masked in {len(recording.mask)} sectors"
     if recording.T_base_sensor is not None:
         x, y, yaw = recording.T_base_sensor
         yield "sensor on the robot", f"x {x:.3f} m, y {y:.3f} m, yaw {np.degrees(yaw):.1f} degrees"

@@ -40,7 +40,7 @@ def localize(
     if save_map is not None:
         format_of(save_map)
     with counting("scans") as count:
-        outcome = run(open_recording(recording, topic), landmarks, chosen, count)
+        outcome = run(open_recording(recording, topic, chosen.sensor.mask), landmarks, chosen, count)
     if output is not None:
         write_poses(output, outcome)
     if save_map is not None:

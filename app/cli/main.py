@@ -45,7 +45,7 @@ def process(
     fitters = [chosen.patched({"extraction": {"fitter": name}}).extraction.fitter for name in fitter or []]
     with counting("scans") as count:
         counts = run(
-            open_recording(recording, topic),
+            open_recording(recording, topic, chosen.sensor.mask),
             output,
             chosen.extraction,
             fitters or [chosen.extraction.fitter],

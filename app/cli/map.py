@@ -24,7 +24,7 @@ def map_recording(
     from .map_run import build, write_files
 
     chosen = settings_from(settings, set_)
-    opened = open_recording(recording, topic)
+    opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans") as count:
         built = build(opened, chosen, count)
     walls = write_files(output, built, chosen)

@@ -63,8 +63,9 @@ def walls(
     from lidarcore import open_recording
     from lidarcore.evaluation.maps.walls import mapped_log, occupied_at_walls, walls_over_free
 
-    scans = list(open_recording(recording, topic))
-    grid, found = mapped_log(scans, settings_from(settings, set_).extraction)
+    chosen = settings_from(settings, set_)
+    scans = list(open_recording(recording, topic, chosen.sensor.mask))
+    grid, found = mapped_log(scans, chosen.extraction)
     typer.echo(
         f"{len(found)} walls, {found.length.sum():.1f} m, {int((found.length > 2).sum())} longer than 2 m, "
         f"{len(found.corners)} corners.\n"

@@ -11,10 +11,10 @@ import typer
 from .options import Set, SettingsFile, end_like_ctrl_c, settings_from
 
 if TYPE_CHECKING:
-    from lidarcore import ExtractionSettings
     from lidarcore.rplidar import Driver
 
     from ..jobs.recorder import AsyncRecorder, RecorderStatus
+    from ..pipeline.settings import Settings
 
 LONGEST = 1e8  # s, three years; a timer has an end
 ENOUGH = 0.9  # share of the duration asked for that counts as all of it
@@ -62,25 +62,27 @@ def record(
         )
         stack.enter_context(driver)
         stack.enter_context(_progress(recorder, driver))
-        _follow(driver, recorder, duration, chosen.extraction)
+        _follow(driver, recorder, duration, chosen)
     _conclude(output, recorder.status, troubles)
     if duration is not None and recorder.status.duration < ENOUGH * duration:
         raise SystemExit(1)
 
 
 def _follow(
-    driver: "Driver", recorder: "AsyncRecorder", duration: float | None, settings: "ExtractionSettings"
+    driver: "Driver", recorder: "AsyncRecorder", duration: float | None, settings: "Settings"
 ) -> None:
     """Hand scans over until the time is up, also if no more come, or the recorder has failed."""
     from lidarcore import extract
+    from lidarcore.body_mask import masked
 
+    mask = settings.sensor.mask or ()
     alarm = threading.Timer(duration or 0, driver.close)
     alarm.daemon = True
     try:
         for scan in driver:
             if duration is not None and alarm.ident is None:
                 alarm.start()
-            recorder.put(scan, extract(scan, settings))
+            recorder.put(scan, extract(masked(scan, mask), settings.extraction), mask)
             if recorder.status.state == "failed":
                 return
     finally:

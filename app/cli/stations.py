@@ -8,9 +8,10 @@ import typer
 from .options import Set, SettingsFile, check_folder, counting, settings_from
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from lidarcore import Scan
+    from lidarcore.body_mask import Sector
 
 WIDTH = 150  # of the tables in a file or a pipe
 
@@ -46,12 +47,12 @@ def stations(
         consistency_tables.check(output, (".json",))
         check_folder(output)
     names = [name.strip() for name in methods.split(",")]
-    extraction = settings_from(settings, set_).extraction
+    chosen = settings_from(settings, set_)
     with counting("stations") as tell:
         found = study(
-            named_stations(recordings, topic),
+            named_stations(recordings, topic, chosen.sensor.mask),
             names,
-            extraction,
+            chosen.extraction,
             window=window,
             calibrated=not given,
             tell=tell,
@@ -70,14 +71,17 @@ def stations(
         station_tables.write(found, output)
 
 
-def named_stations(recordings: list[Path], topic: str | None) -> "Iterator[tuple[str, list[Scan]]]":
+def named_stations(
+    recordings: list[Path], topic: str | None, mask: "Sequence[Sector] | None"
+) -> "Iterator[tuple[str, list[Scan]]]":
     """Each that is long enough, with a name: that of its file, and a number if there are several."""
     from lidarcore import open_recording
     from lidarcore.evaluation.stations.recording import stations as split
     from lidarcore.evaluation.stations.study import SHORTEST
 
     for path in recordings:
-        found = [scans for scans in split(open_recording(path, topic)) if len(scans) >= SHORTEST]
+        opened = open_recording(path, topic, mask)
+        found = [scans for scans in split(opened) if len(scans) >= SHORTEST]
         name = path.name.split(".", 1)[0]
         for number, scans in enumerate(found, 1):
             yield (f"{name} {number}" if len(found) > 1 else name), scans

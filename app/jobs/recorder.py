@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from lidarcore import Features, LidarError, Scan
+from lidarcore.body_mask import Sector
 from lidarcore.recordings import ELLIPSE_SCALE, RecordingWriter
 from lidarcore.rplidar import CaptureWriter, Direction, Piece, Stream
 
@@ -87,7 +88,7 @@ class _Recording:
             error=self.error,
         )
 
-    def _spooling(self, to: RecordingWriter) -> Spooler[tuple[Scan, Features | None]]:
+    def _spooling(self, to: RecordingWriter) -> Spooler[tuple[Scan, Features | None, tuple[Sector, ...]]]:
         return Spooler(WAITING_SCANS, lambda item: to.write(*item), to.flush, to.close, self._fail)
 
     def _capturing(self, to: CaptureWriter) -> Spooler[Piece]:
@@ -155,10 +156,10 @@ class AsyncRecorder:
                 raise ConflictError(f"{self._recording.name} is being recorded: stop that first.")
             self._recording = _Recording(path, raw, stream or Stream(), sensor, ellipse_scale)
 
-    def put(self, scan: Scan, features: Features | None = None) -> None:
-        """Record a scan, if a recording runs. Returns at once."""
+    def put(self, scan: Scan, features: Features | None = None, mask: tuple[Sector, ...] = ()) -> None:
+        """Record a scan as it was measured, and the mask that holds, if a recording runs. Returns at once."""
         if (recording := self._recording) and recording.running:
-            recording.scans.put((scan, features))
+            recording.scans.put((scan, features, mask))
 
     def tap(self, direction: Direction, time: float, data: bytes) -> None:
         """Record bytes of the port, if a capture runs: the tap of a Driver. Returns at once."""

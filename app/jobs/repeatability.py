@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from lidarcore import Array, ExtractionSettings, compare
+from lidarcore.body_mask import Sector
 from lidarcore.evaluation.repeatability.statistics import Repeatability
 from lidarcore.evaluation.repeatability.summary import Summary
 
@@ -25,6 +26,7 @@ class _Kind(NamedTuple):
     source: int
     window: int
     extraction: ExtractionSettings
+    mask: tuple[Sector, ...]
 
 
 class LiveRepeatability:
@@ -111,7 +113,9 @@ def _kind(frame: Frame) -> _Kind:
     """All methods and both covariances are told of, whichever are chosen."""
     chosen, default = frame.settings.extraction, ExtractionSettings()
     neutral = replace(chosen, fitter=default.fitter, covariance=default.covariance)
-    return _Kind(frame.timed.source, frame.settings.repeatability.window, neutral)
+    return _Kind(
+        frame.timed.source, frame.settings.repeatability.window, neutral, frame.settings.sensor.mask or ()
+    )
 
 
 def _follows(last: TimedScan | None, now: TimedScan) -> bool:

@@ -12,6 +12,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from lidarcore import SensorNoise, Tracker, compare, localization, warm_up
+from lidarcore.body_mask import Sector, masked, suggest_mask
 from lidarcore.clusters import cluster
 
 from ..errors import NotFoundError
@@ -23,7 +24,7 @@ from .frame import Frame, Selection
 from .navigation import NOT_LOCALIZED, LocalizationStatus, Navigation
 from .newest import NewestScan
 from .noise_watch import NoiseWatch
-from .sensor_noises import SensorNoises
+from .sensor_setups import SensorSetup, SensorSetups
 from .settings import Settings
 
 logger = logging.getLogger(__name__)
@@ -44,12 +45,13 @@ class Runtime:
         settings: Settings,
         navigation: Navigation,
         draw: Callable[[Frame], None],
-        noises: SensorNoises,
+        setups: SensorSetups,
     ) -> None:
-        self._noises = noises
-        if settings.extraction.noise != SensorNoise():
-            noises.tell(source, settings.extraction.noise)
-        self.settings = settings.with_noise(noises.of(source))
+        self._setups = setups
+        usual = setups.of(source)
+        if (wanted := _given(settings, usual)) != usual:
+            setups.tell(source, wanted)
+        self.settings = settings.with_setup(wanted)
         self.navigation = navigation
         self.selection = Selection()
         self.frame: Frame | None = None
@@ -80,10 +82,13 @@ class Runtime:
     def set(self, patch: Mapping[str, Any]) -> Settings:
         """Change settings by a merge patch; the only way there is. Raises pydantic.ValidationError."""
         with self._lock:
-            before = self.settings.extraction.noise
-            self.settings = self.settings.patched(patch)
-            if self.settings.extraction.noise != before:
-                self._noises.tell(self.player.source, self.settings.extraction.noise)
+            before, source = _setup(self.settings), self.player.source
+            settings = self.settings.patched(patch)
+            if settings.sensor.mask is None:
+                settings = settings.with_setup(SensorSetup(settings.extraction.noise, source.mask))
+            self.settings = settings
+            if _setup(settings) != before:
+                self._setups.tell(source, _setup(settings))
         return self._refreshed()
 
     def select_landmark(self, landmark: int | None) -> None:
@@ -128,11 +133,15 @@ class Runtime:
         return self.navigation.odometry.put(stamp, T_odom_sensor, limits)
 
     def open(self, source: Source, index: int = 0, paused: bool = False) -> None:
-        """Play another source, with the noise of its sensor."""
+        """Play another source, with the noise and the mask of its sensor."""
         self.selection = Selection()
         with self._lock:
-            self.settings = self.settings.with_noise(self._noises.of(source))
+            self.settings = self.settings.with_setup(self._setups.of(source))
         self.player.open(source, index, paused)
+
+    def suggested_mask(self) -> tuple[Sector, ...]:
+        """Where the robot's own body is, by the scans that the source still has. Raises MaskError."""
+        return suggest_mask(self.player.source.some())
 
     def _refreshed(self) -> Settings:
         self.player.refresh()
@@ -163,6 +172,7 @@ class Runtime:
 
     def _process(self, timed: TimedScan) -> Frame:
         settings = self.settings
+        timed = replace(timed, scan=masked(timed.scan, settings.sensor.mask or ()))
         if timed.source != self._source:
             self._source = timed.source
             self._tracker.forget()
@@ -211,3 +221,13 @@ class Runtime:
         self._times.append(now)
         span = now - self._times[0]
         return (len(self._times) - 1) / span if span else 0.0
+
+
+def _setup(settings: Settings) -> SensorSetup:
+    return SensorSetup(settings.extraction.noise, settings.sensor.mask or ())
+
+
+def _given(settings: Settings, usual: SensorSetup) -> SensorSetup:
+    """What settings say of the sensor; the usual where they say nothing."""
+    noise, mask = settings.extraction.noise, settings.sensor.mask
+    return SensorSetup(usual.noise if noise == SensorNoise() else noise, usual.mask if mask is None else mask)

@@ -10,10 +10,13 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails
 
 from lidarcore import FITTERS, ExtractionSettings, SensorNoise
+from lidarcore.body_mask import Mask
 from lidarcore.clusters import ClusterSettings
 from lidarcore.evaluation.repeatability.scatter import LEAST
 from lidarcore.evaluation.repeatability.statistics import WINDOW
 from lidarcore.localization import NavigationSettings
+
+from .sensor_setups import SensorSetup
 
 Colour = Literal["plain", "segment", "quality", "range"]
 
@@ -116,12 +119,26 @@ class LiveNavigation(NavigationSettings):
     ] = "scans"
 
 
+class SensorSettings(_Frozen):
+    """How the sensor sits on its robot."""
+
+    mask: Annotated[
+        Mask | None,
+        Field(
+            description="sectors, from `first` counter-clockwise to `last` (rad), in which the robot's own body is "
+            "seen: what is nearer than `reach` (m) is left out before everything else; if not given, those kept "
+            "with the recording"
+        ),
+    ] = None
+
+
 class Settings(_Frozen):
-    """All settings: of the extraction, of the clusters, of localization, of the view and of repeatability.
+    """All settings: of sensor, extraction, clusters, localization, view and repeatability.
 
     There is one sensor, so `clusters.noise` always is `extraction.noise`.
     """
 
+    sensor: SensorSettings = SensorSettings()
     extraction: ExtractionSettings = ExtractionSettings()
     clusters: ClusterSettings = ClusterSettings()
     navigation: LiveNavigation = LiveNavigation()
@@ -154,6 +171,11 @@ class Settings(_Frozen):
     def with_noise(self, noise: SensorNoise) -> "Settings":
         """These settings for a sensor of that noise."""
         return self.patched({"extraction": {"noise": asdict(noise)}})
+
+    def with_setup(self, setup: SensorSetup) -> "Settings":
+        """These settings for a sensor of that noise and mask."""
+        mask = [asdict(sector) for sector in setup.mask]
+        return self.with_noise(setup.noise).patched({"sensor": {"mask": mask}})
 
     def patched(self, patch: Mapping[str, Any]) -> "Settings":
         """These settings with a JSON merge patch (RFC 7396) applied; null puts the default back.

@@ -9,9 +9,7 @@ from collections.abc import Callable
 from lidarcore import Scan
 
 from ..threads import FailureLog, join
-from .source import END_WITHIN, Source
-
-HISTORY = 200  # scans kept for stepping back
+from .source import END_WITHIN, HISTORY, Source
 
 
 class HistorySource(Source):
@@ -49,6 +47,10 @@ class HistorySource(Source):
             return None
         self._shown = index, kept  # however long it is looked at
         return kept[0]
+
+    def some(self) -> list[Scan]:
+        with self._lock:
+            return [scan for scan, _ in self._kept]
 
     def arrival(self, index: int) -> float:
         return kept[1] if (kept := self._at(index)) else time.monotonic()

@@ -9,11 +9,14 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lidarcore import LidarError, RecordingError, Scan, TopicError, open_recording
+from lidarcore.body_mask import Sector
 
 from ..isolation import Isolated
 from ..threads import join
-from .source import END_WITHIN, Source
+from .source import END_WITHIN, HISTORY, Source
 from .timed_scan import SourceKind
 
 PERIOD = 0.1  # s between scans whose stamps do not grow
@@ -38,7 +41,7 @@ class RecordingSource(Source):
         assert isinstance(opened, _Opened)
         self.name, self.format = path.name, opened.format
         self.topic, self.topics = opened.topic, opened.topics
-        self._notes = opened.notes
+        self._notes, self.mask = opened.notes, opened.mask
         self._cut: tuple[str, ...] = ()
         self._scans: list[Scan] = []
         self._times: list[float] = []
@@ -65,6 +68,11 @@ class RecordingSource(Source):
 
     def time(self, index: int) -> float:
         return self._times[index]
+
+    def some(self) -> list[Scan]:
+        last = self.count - 1
+        places = np.unique(np.linspace(0, last, min(HISTORY, self.count)).astype(int)) if self.count else ()
+        return [self._scans[place] for place in places]
 
     def start(self, arrived: Callable[[], None], progress: Callable[[], None]) -> None:
         self._thread = threading.Thread(
@@ -134,16 +142,18 @@ class _Opened:
     topic: str | None
     topics: tuple[str, ...]
     notes: tuple[str, ...]
+    mask: tuple[Sector, ...]
 
 
 def _read(path: Path, topic: str | None) -> Iterator["_Opened | dict[str, Any]"]:
     """What a recording is once its first scan is there, and again when there is more to note; its scans by field."""
     recording = open_recording(path, topic)
+    mask, recording.mask = recording.mask, ()  # the pipeline applies it, since it can be changed
     told: _Opened | None = None
     for scan in recording:
-        opened = _Opened(recording.name, recording.topic, recording.topics, recording.notes)
+        opened = _Opened(recording.name, recording.topic, recording.topics, recording.notes, mask)
         if opened != told:
             yield opened
         told = opened
         yield {field.name: getattr(scan, field.name) for field in fields(scan)}
-    yield _Opened(recording.name, recording.topic, recording.topics, recording.notes)
+    yield _Opened(recording.name, recording.topic, recording.topics, recording.notes, mask)

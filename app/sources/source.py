@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from lidarcore import DeviceError, Scan, SensorNoise
+from lidarcore.body_mask import Sector
 from lidarcore.rplidar import State
 
 from .timed_scan import SourceKind
 
+HISTORY = 200  # scans kept of a live source for stepping back
 END_WITHIN = 2.0  # s that a thread may take to notice that its source was closed
 
 
@@ -58,6 +60,9 @@ class Source(Protocol):
     noise: SensorNoise = SensorNoise()
     """What the sensor errs by, as far as that is known before it is calibrated."""
 
+    mask: tuple[Sector, ...] = ()
+    """Where the robot's own body is seen, as the recording has kept it. Its scans are still with it."""
+
     @property
     def sensor(self) -> str:
         """Which sensor took the scans: noise is set, and remembered, for each of its own."""
@@ -87,6 +92,10 @@ class Source(Protocol):
     @abstractmethod
     def time(self, index: int) -> float:
         """Play time of a scan that is there, s since the first one."""
+
+    @abstractmethod
+    def some(self) -> list[Scan]:
+        """At most HISTORY of those that can be shown: of a live source the last ones, of a recording from all over."""
 
     def arrival(self, index: int) -> float:
         """When its last byte came, time.monotonic() s; for one that is not live, now."""

@@ -31,6 +31,7 @@ STATUS: dict[type, int] = {
     library.ProtectionStopError: 503,
     library.UnpluggedError: 503,
     library.NoAnswerError: 504,
+    library.MaskError: 409,  # nothing to suggest one from yet
     library.UnknownLandmarkError: 404,
     library.UnknownSessionError: 404,
     library.MapFileError: 422,

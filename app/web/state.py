@@ -7,6 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from lidarcore import Scan, extract
+from lidarcore.body_mask import masked
 from lidarcore.errors import LandmarkMapError
 
 from ..jobs.calibration import LiveCalibration
@@ -18,7 +19,7 @@ from ..jobs.sensor_memory import SensorMemory
 from ..jobs.studies import Studies
 from ..pipeline.navigation import Navigation
 from ..pipeline.runtime import Runtime
-from ..pipeline.sensor_noises import SensorNoises
+from ..pipeline.sensor_setups import SensorSetups
 from ..pipeline.settings import Settings
 from ..scene.scene import Scene
 from ..sources.library import MAX_BYTES, Library
@@ -63,9 +64,9 @@ class State:
         self._ending = ExitStack()
         self.landmarks = _landmark_store(options, self._ending)
         folder = options.recordings.parent
-        noises = SensorNoises(SensorMemory(folder / SENSORS))
+        setups = SensorSetups(SensorMemory(folder / SENSORS))
         scene = Scene(self.viser.server)
-        self.runtime = Runtime(first, options.settings, Navigation(self.landmarks), scene.draw, noises)
+        self.runtime = Runtime(first, options.settings, Navigation(self.landmarks), scene.draw, setups)
         self.metrics = Metrics()
         self.hub = Hub(self.runtime, self.recorder, self.landmarks, self.metrics.sent)
         self.metrics.observe(self.runtime, self.hub, self.recorder)
@@ -102,7 +103,9 @@ class State:
     def _record(self, scan: Scan) -> None:
         """Every scan of a live source is recorded, shown or not, with what the main method finds in it."""
         if self.recorder.running:
-            self.recorder.put(scan, extract(scan, self.runtime.settings.extraction))
+            settings = self.runtime.settings
+            mask = settings.sensor.mask or ()
+            self.recorder.put(scan, extract(masked(scan, mask), settings.extraction), mask)
 
 
 def _landmark_store(options: ServerOptions, ending: ExitStack) -> LandmarkStore:

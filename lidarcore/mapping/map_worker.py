@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from lidarcore.mapping.back import BackEnd
 from lidarcore.mapping.front import Tracked
 from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
 from lidarcore.mapping.settings import MapperSettings
-from lidarcore.mapping.walls import Walls, find_walls
+from lidarcore.mapping.walls import WallIds, Walls, find_walls
 from lidarcore.mapping.worker import Worker
 from lidarcore.settings import ExtractionSettings
 
@@ -41,14 +42,24 @@ class MapPicture:
 
 
 class MapWorker:
-    """Takes keyframes; `corrected` and `picture` are replaced whole, and may be read from any thread."""
+    """Takes keyframes; `corrected` and `picture` are replaced whole, and may be read from any thread.
 
-    def __init__(self, settings: MapperSettings, extraction: ExtractionSettings) -> None:
+    keep  called with the walls, in the thread of the map, each time that they were found
+    """
+
+    def __init__(
+        self,
+        settings: MapperSettings,
+        extraction: ExtractionSettings,
+        keep: Callable[[Walls], None] | None = None,
+    ) -> None:
+        self._keep = keep
         self.corrected = Corrected(np.zeros((1, 3)), np.zeros((3, 3)))
         self.picture: MapPicture | None = None
         self._extraction = extraction
         self._back = BackEnd(settings)
         self._builder, self._drawn = GridBuilder(GridSettings(most_cells=_MOST_CELLS)), 0
+        self._wall_ids = WallIds()
         self._next_picture = self._next_walls = 0.0
         self._failing = False
         self._worker: Worker[Tracked] = Worker(self._work, "map", idle=_EVERY)
@@ -106,7 +117,9 @@ class MapWorker:
         self.picture = MapPicture(grid, self.picture.walls if self.picture else None)
         begin = time.monotonic()
         if begin >= self._next_walls:
-            self.picture = MapPicture(grid, self._walls(grid))
+            self.picture = MapPicture(grid, walls := self._walls(grid))
+            if self._keep:
+                self._keep(walls)
             end = time.monotonic()
             self._next_walls = end + _REST * (end - begin)
 
@@ -120,4 +133,5 @@ class MapWorker:
     def _walls(self, grid: OccupancyGrid) -> Walls:
         graph, scans = self._back.graph, [keyframe.scan for keyframe in self._back.keyframes]
         covariances = np.array([graph.covariance(k) for k in range(len(scans))])
-        return find_walls(scans, graph.poses, covariances, grid, extraction=self._extraction)
+        found = find_walls(scans, graph.poses, covariances, grid, extraction=self._extraction)
+        return self._wall_ids.identified(found)

@@ -22,7 +22,7 @@ _STEP = 1e-6  # m, of numeric derivatives by the coordinates of points
 
 @dataclass(frozen=True, slots=True)
 class Feature:
-    """A wall or a corner by its number."""
+    """A wall of a map by its id; a corner, or what a scan shows, by its place."""
 
     kind: Kind
     index: int
@@ -62,15 +62,13 @@ def angle(walls: Walls, first: Feature, second: Feature) -> Measurement:
     return _measured(walls, first, second, angle_of)
 
 
-def length(walls: Walls, index: int) -> Measurement:
+def length(walls: Walls, id: int) -> Measurement:
     """Of a wall, from end to end; a lower bound where it may go on. Raises MeasureError."""
-    _check(walls, Feature("wall", index))
+    index = _place(walls, Feature("wall", id))
     return Measurement(float(walls.length[index]), float(np.sqrt(walls.length_variance[index])))
 
 
 def _measured(walls: Walls, first: Feature, second: Feature, f: _Function) -> Measurement:
-    for one in (first, second):
-        _check(walls, one)
     if first == second:
         raise MeasureError("Both features are the same: give two.")
     points = np.concatenate([_points(walls, one) for one in (first, second)])
@@ -88,20 +86,27 @@ def _measured(walls: Walls, first: Feature, second: Feature, f: _Function) -> Me
     return Measurement(abs(value), float(np.sqrt(max(float(J @ covariance @ J), 0.0))))
 
 
-def _check(walls: Walls, one: Feature) -> None:
-    count = len(walls) if one.kind == "wall" else len(walls.corners)
-    if not 0 <= one.index < count:
-        raise MeasureError(f"There is no {one.kind}-{one.index}: the map has {count} of them.")
+def _place(walls: Walls, one: Feature) -> int:
+    """Where among the walls or the corners it is. Raises MeasureError."""
+    known = walls.ids if one.kind == "wall" else np.arange(len(walls.corners))
+    found = np.flatnonzero(known == one.index)
+    if not len(found):
+        raise MeasureError(
+            f"There is no {one.kind}-{one.index}: the map has {len(known)} {one.kind}s, named in its files."
+        )
+    return int(found[0])
 
 
 def _points(walls: Walls, one: Feature) -> Array:
-    """Both ends of a wall, or the corner itself: (2, 2) or (1, 2) m."""
-    points: Array = walls.ends[one.index] if one.kind == "wall" else walls.corners.xy[one.index][None]
+    """Both ends of a wall, or the corner itself: (2, 2) or (1, 2) m. Raises MeasureError."""
+    at = _place(walls, one)
+    points: Array = walls.ends[at] if one.kind == "wall" else walls.corners.xy[at][None]
     return points
 
 
 def _rows(walls: Walls, one: Feature) -> csr_array:
-    return walls.model.ends_of(one.index) if one.kind == "wall" else walls.corners.rows_of(one.index)
+    at = _place(walls, one)
+    return walls.model.ends_of(at) if one.kind == "wall" else walls.corners.rows_of(at)
 
 
 def _across(point: Array, wall: Array) -> float:

@@ -6,9 +6,11 @@ A format is one module of this package with one subclass of Recording; it is fou
 import inspect
 import os
 import pkgutil
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 
+from lidarcore.body_mask import Sector
 from lidarcore.errors import RecordingError
 from lidarcore.files.streams import read_head
 from lidarcore.recordings.base import Recording
@@ -38,11 +40,14 @@ def _formats() -> tuple[type[Recording], ...]:
 FORMATS: tuple[type[Recording], ...] = _formats()
 
 
-def open_recording(path: str | os.PathLike[str], topic: str | None = None) -> Recording:
+def open_recording(
+    path: str | os.PathLike[str], topic: str | None = None, mask: Sequence[Sector] | None = None
+) -> Recording:
     """Open a recording of any known format, also packed with gzip or zstd. Content decides, not the name.
 
     path   a file, or the folder of a ROS 2 bag
     topic  one of several lidars in the file; needed only if there are several
+    mask   sectors of the robot's own body to leave out, () for none; if None, those kept in the recording
 
     Returns a `Recording`: iterate over it for its scans, as often as you like; `notes` says what was left out.
 
@@ -64,7 +69,10 @@ def open_recording(path: str | os.PathLike[str], topic: str | None = None) -> Re
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
         raise RecordingError(f"{path} cannot be opened: {error}.") from error
     if recognised:
-        return recognised[0](path, topic)
+        recording = recognised[0](path, topic)
+        if mask is not None:
+            recording.mask = tuple(mask)
+        return recording
     if path.is_dir():
         raise RecordingError(f"The directory {path.name} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
     known = ", ".join(format_.name for format_ in FORMATS)

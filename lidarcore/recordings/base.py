@@ -9,6 +9,7 @@ from io import BufferedReader
 from pathlib import Path
 from typing import ClassVar
 
+from lidarcore.body_mask import Sector, masked
 from lidarcore.errors import LidarError, RecordingError, ScanError, TopicError
 from lidarcore.files.streams import MEBIBYTE, available, open_stream, whole
 from lidarcore.scan import Array, Scan
@@ -30,6 +31,7 @@ class Recording(ABC):
     path            of the file or directory
     topics          the lidars in the file, where the format names them; topic: the one that is read
     T_base_sensor   (3,) x m, y m, yaw rad of the sensor in the robot's base frame; None if the file has none
+    mask            sectors of the robot's own body, left out of every scan; those kept in the file, else ()
     stations        numbers of the scans from which on the sensor stood at another place, as far as the file says so
                     and the iteration has come; () if it says nothing
 
@@ -49,6 +51,7 @@ class Recording(ABC):
         self.topics: tuple[str, ...] = ()
         self.topic: str | None = None
         self.T_base_sensor: Array | None = None
+        self.mask: tuple[Sector, ...] = ()
         self._stations: list[int] = []
         self._remarks: dict[str, None] = {}
         self._counts: Counter[str] = Counter()
@@ -90,7 +93,7 @@ class Recording(ABC):
                     self._count(f"damaged scans left out ({error})", 1)
                 else:
                     empty = False
-                    yield scan
+                    yield masked(scan, self.mask)
         if empty:
             raise self._error("holds no readable scan.")
 

@@ -8,10 +8,11 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from lidarcore.body_mask import Sector, as_text
 from lidarcore.features import Features
 from lidarcore.files.growing_file import GrowingFile
 from lidarcore.recordings.base import NOMINAL_PERIOD
-from lidarcore.recordings.ros.mcap import MAGIC
+from lidarcore.recordings.ros.mcap import MAGIC, MASK, METADATA
 from lidarcore.recordings.ros.messages import typestore
 from lidarcore.scan import Scan
 
@@ -35,6 +36,7 @@ class RecordingWriter:
     /scan/beams  lidarcore_msgs/Beams (see beams.py): exact bearings, times and gaps, for `open_recording`
     /odom, /tf   nav_msgs/Odometry and its transform, if scans have odometry
     /features    visualization_msgs/MarkerArray: walls, corners and their ellipses, if features are given
+    The mask of the robot's body is kept as metadata, and the ranges as they were measured.
 
     Times of recording follow the stamps, and go on by 0.1 s where the stamps do not grow. Whole scans are written
     together, twice a second: after `kill -9` or on a full disk the file is whole up to there, without an index.
@@ -52,9 +54,10 @@ class RecordingWriter:
         self._file = GrowingFile(Path(path), END)
         self._mcap = Writer(self._file, chunk_size=1 << 30)  # type: ignore[arg-type]  # chunks end with a flush only
         self._mcap.start("ros2", f"lidarcore {version('lidarcore')}")
-        self._mcap.add_metadata("lidarcore", {"sensor": sensor})
+        self._mcap.add_metadata(METADATA, {"sensor": sensor})
         self._ellipse_scale = ellipse_scale
         self._channels: dict[str, int] = {}
+        self._mask: tuple[Sector, ...] = ()
         self._stamp = self._begin = self._now = 0.0
         self._pending, self._flushed = 0, time.monotonic()
 
@@ -68,12 +71,16 @@ class RecordingWriter:
         """Seconds from the first scan to the last."""
         return self._now - self._begin
 
-    def write(self, scan: Scan, features: Features | None = None) -> None:
-        """Add a scan, and what was found in it. Raises RecordingError, also for a stamp beyond ROS 2."""
+    def write(self, scan: Scan, features: Features | None = None, mask: tuple[Sector, ...] = ()) -> None:
+        """Add a scan, and what was found in it. Raises RecordingError, also for a stamp beyond ROS 2.
+
+        mask  of the robot's body; the one of the last scan is that of the recording
+        """
         from lidarcore.recordings.ros.content import contents
 
         self._file.check_open()
         made = contents(scan, features, self._ellipse_scale)
+        self._keep(mask)
         self._advance(scan.stamp)
         for topic, (type_, message) in made.items():
             self._add(topic, type_.replace("/", "/msg/"), message)
@@ -105,6 +112,11 @@ class RecordingWriter:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def _keep(self, mask: tuple[Sector, ...]) -> None:
+        if mask != self._mask:
+            self._mcap.add_metadata(METADATA, {MASK: as_text(mask)})
+            self._mask = mask
 
     def _advance(self, stamp: float) -> None:
         """Set the time of recording: it steps with the stamps, and it always grows."""

@@ -5,7 +5,7 @@ export const COMPLETE_HINT =
   "Share of the revolution whose measurements arrived, with or without a return";
 
 const FIRST_YEAR = 1990; // with lidar logs
-const DEGREE = Math.PI / 180;
+export const DEGREE = Math.PI / 180;
 
 /** How a field is shown: {unit, scale, digits}; shown value = SI value / scale. Small lengths go in mm. */
 export function displayOf({ unit, default: preset, integer }) {

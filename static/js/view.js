@@ -65,6 +65,7 @@ const OF_SCAN = [
   { layer: "corners", sign: "corner-sign", label: "Corner" },
   { layer: "points", sign: "point-sign", label: "Point", isKnown: ({ colour_scale: scale }) => !scale },
   { layer: "sensor", sign: "sensor-sign", label: "Sensor" },
+  { layer: "sensor", sign: "mask-sign", label: "Masked", isKnown: (_, { sensor }) => sensor.mask?.length },
   { layer: "rejected", sign: "rejected-sign", label: "Rejected" },
   { layer: "clusters", sign: "cluster-sign", label: "Cluster, 2σ" },
   { layer: "gaps", sign: "gap-sign", label: "Lost sector", isKnown: ({ gaps }) => gaps.length },
@@ -100,7 +101,7 @@ function drawLegend(frame, settings, methods, sizes) {
   const { mode, method } = settings.navigation;
   const ofScans = mode === "slam" && method === "scans";
   const mapped = MAPPED.filter(({ layer }) => now && layers[layer] && (layer === "walls") === ofScans);
-  const ofScan = OF_SCAN.filter(({ layer, isKnown }) => layers[layer] && (isKnown?.(frame) ?? true));
+  const ofScan = OF_SCAN.filter(({ layer, isKnown }) => layers[layer] && (isKnown?.(frame, settings) ?? true));
   const signs = [...ofScan, ...paths, ...mapped];
   const notes = layers.ellipses ? ellipseNotes(frame, scale, sizes) : ["Ellipses hidden"];
   const shown = [frame.methods, signs, notes, colours, document.documentElement.dataset.theme];

@@ -22,7 +22,7 @@ from lidarcore_app.web.routes.measure import MeasureJson
 from lidarcore_app.web.routes.meta import HealthJson, MethodsJson, VersionJson
 from lidarcore_app.web.routes.recordings import RecordingsJson
 from lidarcore_app.web.routes.selection import SelectionBody
-from lidarcore_app.web.routes.sensor import FoundDeviceJson
+from lidarcore_app.web.routes.sensor import FoundDeviceJson, SuggestionJson
 from lidarcore_app.web.routes.sessions import SessionsJson
 from lidarcore_app.web.routes.source import SimulationJson
 from lidarcore_app.web.routes.studies import StudiesJson
@@ -53,6 +53,7 @@ TYPES = {
     ("post", "/recordings/{name}/restore"): RecordingEntry,
     ("delete", "/recordings/{name}"): None,
     ("get", "/devices"): list[FoundDeviceJson],
+    ("get", "/sensor/mask/suggestion"): SuggestionJson,
     ("post", "/emulator"): None,
     ("get", "/recorder"): RecorderStatus,
     ("post", "/recorder/start"): RecorderStatus,

@@ -119,7 +119,7 @@ class Server:
         """As after its start: the emulator plays, settings are the defaults, the folder is empty."""
         self.api.post("recorder/stop")
         self.api.put("selection", json={"corner": None, "landmark": None}).raise_for_status()
-        groups = ("extraction", "clusters", "navigation", "view", "repeatability")
+        groups = ("sensor", "extraction", "clusters", "navigation", "view", "repeatability")
         self.patch("settings", dict.fromkeys(groups))
         self.emulate()
         for recording in self.get("recordings")["recordings"]:

@@ -2,34 +2,12 @@
 
 import numpy as np
 import pytest
+from robot_body import drive, on_posts
 
 from lidarcore import Scan, SensorNoise
-from lidarcore.body_mask import Sector, masked, suggest_mask
+from lidarcore.body_mask import MOST_SECTORS, Sector, as_text, from_text, masked, suggest_mask
 from lidarcore.errors import MaskError
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
-
-NOISE = SensorNoise(0.01, 0.001)
-POSTS = ((3.05, 0.08, 0.24), (1.2, 0.05, 0.35))  # bearing, half width (rad), range (m); one across the wrap
-
-
-def scans(count: int = 60, moving: bool = True) -> list[Scan]:
-    rng = np.random.default_rng(5)
-    sensor, still = SimulatedSensor(furnished_room(), NOISE), random_pose(furnished_room(), rng)
-    found = []
-    for _ in range(count):
-        scan = sensor.scan(random_pose(furnished_room(), rng) if moving else still, rng)[0]
-        ranges = scan.ranges.copy()
-        for bearing, half, at in POSTS:
-            on = np.abs((scan.bearings - bearing + np.pi) % (2 * np.pi) - np.pi) < half
-            ranges[on] = at + rng.normal(0, 0.005, on.sum())
-        found.append(Scan(ranges, scan.bearings))
-    return found
-
-
-def on_posts(scan: Scan) -> np.ndarray:
-    return np.any(
-        [np.abs((scan.bearings - b + np.pi) % (2 * np.pi) - np.pi) < half for b, half, _ in POSTS], axis=0
-    )
 
 
 def test_near_returns_in_a_sector_go_and_all_others_stay():
@@ -49,7 +27,7 @@ def test_sectors_go_counter_clockwise_across_the_wrap():
 
 
 def test_what_stays_while_the_room_moves_is_suggested():
-    seen = scans()
+    seen = drive()
     sectors = suggest_mask(seen)
     assert len(sectors) == 2
     for scan in seen:
@@ -60,17 +38,40 @@ def test_what_stays_while_the_room_moves_is_suggested():
 
 def test_a_room_without_a_body_needs_no_mask():
     rng = np.random.default_rng(6)
-    sensor, room = SimulatedSensor(furnished_room(), NOISE), furnished_room()
+    sensor, room = SimulatedSensor(furnished_room(), SensorNoise(0.01, 0.001)), furnished_room()
     assert suggest_mask([sensor.scan(random_pose(room, rng), rng)[0] for _ in range(40)]) == ()
 
 
-@pytest.mark.parametrize(("seen", "word"), [(scans(10), "few"), (scans(30, moving=False), "hardly moved")])
+@pytest.mark.parametrize(("seen", "word"), [(drive(10), "few"), (drive(30, moving=False), "hardly moved")])
 def test_without_motion_nothing_is_suggested(seen, word):
     with pytest.raises(MaskError, match=word):
         suggest_mask(seen)
 
 
-@pytest.mark.parametrize("sector", [(0, 1, 0), (0, np.nan, 1), (np.inf, 1, 1), (0, 1, -2)])
+@pytest.mark.parametrize("sector", [(0, 1, 0), (0, np.nan, 1), (np.inf, 1, 1), (0, 1, -2), (0, 7, 1)])
 def test_sectors_that_are_none_are_refused(sector):
-    with pytest.raises(MaskError):
+    with pytest.raises(ValueError, match="Sector"):
         Sector(*sector)
+
+
+def test_a_mask_as_text_is_the_same_mask():
+    mask = (Sector(2.0, -2.5, 1 / 3), Sector(0.1, 0.2, 0.3))
+    assert from_text(as_text(mask)) == mask
+    assert from_text(as_text(())) == ()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "{}",
+        "[1]",
+        '[{"first": 0, "last": 1}]',
+        '[{"first": 0, "last": NaN, "reach": 1}]',
+        as_text([Sector(0, 1, 1)] * (MOST_SECTORS + 1)),
+        "[" + " " * 100_000 + "]",
+    ],
+)
+def test_a_text_that_is_no_mask_is_refused(text):
+    with pytest.raises(MaskError, match="mask"):
+        from_text(text)

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Body
 from pydantic import Field
 from typing_extensions import TypedDict
 
+from lidarcore.body_mask import Sector
 from lidarcore.rplidar import FoundDevice, find_devices
 
 from ...errors import ConflictError
@@ -13,7 +14,7 @@ from ...sources.live import LiveSource
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import CurrentRuntime
-from .examples import DEVICE_FOUND, ok
+from .examples import DEVICE_FOUND, SUGGESTION, ok
 
 router = APIRouter(tags=["sensor"])
 
@@ -29,6 +30,12 @@ class FoundDeviceJson(TypedDict):
     serial: str | None
     error: str | None
     in_use: bool
+
+
+class SuggestionJson(TypedDict):
+    """A mask as the settings take it; empty if nothing but the room is seen."""
+
+    mask: tuple[Sector, ...]
 
 
 class Fault(StrictBody):
@@ -49,6 +56,19 @@ class Fault(StrictBody):
 def devices() -> list[FoundDeviceJson]:
     """The serial ports of this machine; those that look like an RPLIDAR are asked, which stops one left turning."""
     return [_found(device) for device in find_devices()]
+
+
+@router.get(
+    "/sensor/mask/suggestion",
+    responses=ok(SUGGESTION, "Sectors for the setting `sensor.mask`") | documented(409),
+)
+def suggest(runtime: CurrentRuntime) -> SuggestionJson:
+    """Where the robot's own body is: near, and in its place while everything else moves. Nothing is changed.
+
+    Asked of the last 20 s of a sensor, or of 200 scans of a recording as they were measured, without the present mask.
+    409 if there are too few of them, or the sensor did not move enough to tell body and room apart.
+    """
+    return {"mask": runtime.suggested_mask()}
 
 
 @router.post("/emulator", status_code=204, responses=documented(409, 422))

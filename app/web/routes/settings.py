@@ -7,11 +7,11 @@ from fastapi import APIRouter, Body
 from ...pipeline.settings import Settings
 from ..problems import documented
 from .dependencies import CurrentRuntime
-from .examples import SETTINGS_PATCH, ok
+from .examples import SETTINGS_PATCH, SUGGESTION, ok
 
 router = APIRouter(prefix="/settings", tags=["settings"])
 
-EXAMPLE = Settings().model_dump(mode="json")
+EXAMPLE = Settings().patched({"sensor": SUGGESTION}).model_dump(mode="json")
 
 
 @router.get("", responses=ok(EXAMPLE, "All settings"))

@@ -6,6 +6,7 @@ Format: https://mcap.dev/spec
 import struct
 import zlib
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from io import BytesIO
 from typing import IO
 
@@ -13,11 +14,16 @@ from lidarcore.files.streams import DAMAGE, Unpacker, available, skip, take
 from lidarcore.recordings.ros.messages import WANTED, Message, check_topics, plain_type
 
 MAGIC = b"\x89MCAP0\r\n"
-SCHEMA, CHANNEL, MESSAGE, CHUNK, DATA_END = 3, 4, 5, 6, 15
+SCHEMA, CHANNEL, MESSAGE, CHUNK, METADATA_RECORD, DATA_END = 3, 4, 5, 6, 12, 15
+METADATA, MASK = "lidarcore", "mask"  # name and key of what this library keeps beside the messages
+MOST_METADATA = 1 << 14  # bytes of a record; larger ones are of others
 
 
 class McapReader:
-    """Reads the ROS messages of the WANTED types, and each topic's type into `connections`."""
+    """Reads the ROS messages of the WANTED types, and each topic's type into `connections`.
+
+    `metadata` gets what this library keeps beside them, the last of each key.
+    """
 
     def __init__(
         self,
@@ -27,6 +33,7 @@ class McapReader:
         connections: dict[str, str],
     ) -> None:
         self._unpacker, self._remark, self._count, self._connections = unpacker, remark, count, connections
+        self.metadata: dict[str, str] = {}
         self._types: dict[int, str] = {}
         self._channels: dict[int, tuple[str, str, str]] = {}
 
@@ -72,6 +79,10 @@ class McapReader:
             self._channels[channel] = topic, self._types.get(schema, "unknown type"), encoding
             self._connections[topic] = self._channels[channel][1]
             check_topics(len(self._connections))
+        elif opcode == METADATA_RECORD:
+            with suppress(*DAMAGE):  # the messages are read all the same
+                if _string(stream) == METADATA:
+                    self.metadata |= _texts(BytesIO(take(stream, *_read(stream, "<I"))))
         elif opcode == MESSAGE:
             channel, _, log_time, _ = _read(stream, "<HIQQ")
             topic, type_, encoding = self._channels[channel]
@@ -81,12 +92,13 @@ class McapReader:
 
 
 def _walk(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
-    """Yield opcode and content of each schema, channel, message and chunk; the last may be cut short."""
+    """Yield opcode and content of each record that is read; the last may be cut short."""
     while opcode := stream.read(1):
         (size,) = _read(stream, "<Q")
         if opcode[0] == DATA_END:
             return
-        if opcode[0] not in (SCHEMA, CHANNEL, MESSAGE, CHUNK):
+        wanted = opcode[0] in (SCHEMA, CHANNEL, MESSAGE, CHUNK)
+        if not wanted and not (opcode[0] == METADATA_RECORD and size <= MOST_METADATA):
             skip(stream, size)
             continue
         data = available(stream, size)
@@ -98,6 +110,15 @@ def _walk(stream: IO[bytes]) -> Iterator[tuple[int, bytes]]:
 
 def _read(stream: IO[bytes], layout: str) -> tuple[int, ...]:
     return struct.unpack(layout, take(stream, struct.calcsize(layout)))
+
+
+def _texts(stream: IO[bytes]) -> dict[str, str]:
+    """A map of strings."""
+    texts = {}
+    while size := stream.read(4):
+        key = take(stream, *struct.unpack("<I", size)).decode()
+        texts[key] = _string(stream)
+    return texts
 
 
 def _string(stream: IO[bytes]) -> str:

@@ -9,10 +9,11 @@ from contextlib import closing
 from pathlib import Path
 from urllib.parse import quote
 
-from lidarcore.errors import RecordingError
+from lidarcore.body_mask import from_text
+from lidarcore.errors import MaskError, RecordingError
 from lidarcore.files.streams import DAMAGE, MEBIBYTE, ZSTD, Unpacker, is_packed, open_stream, read_head
 from lidarcore.foreign_database import bound, stores_its_columns
-from lidarcore.recordings.ros.mcap import McapReader
+from lidarcore.recordings.ros.mcap import MASK, McapReader
 from lidarcore.recordings.ros.messages import MOST_TOPICS, WANTED, Message, check_topics, plain_type
 from lidarcore.recordings.ros.recording import RosRecording
 
@@ -29,6 +30,14 @@ class Rosbag2(RosRecording):
     def recognises(cls, path: Path, head: bytes) -> bool:
         """Say whether the file is of this format, or the directory holds such files."""
         return bool(_storage_files(path)) if path.is_dir() else super().recognises(path, head)
+
+    def _open(self, topic: str | None) -> None:
+        self._metadata: dict[str, str] = {}
+        super()._open(topic)
+        try:
+            self.mask = from_text(self._metadata.get(MASK, "[]"))
+        except MaskError as error:
+            self._remark(f"{error} It is left out.")
 
     def _messages(self, connections: dict[str, str]) -> Iterator[Message]:
         files = _storage_files(self.path) if self.path.is_dir() else [self.path]
@@ -53,6 +62,7 @@ class Rosbag2(RosRecording):
             reader = McapReader(unpacker, self._remark, self._count, connections)
             with open_stream(file, self._remark) as stream:
                 yield from reader.messages(stream)
+            self._metadata |= reader.metadata
 
     def _rows(self, file: Path, connections: dict[str, str]) -> Iterator[Message]:
         """Yield the messages in the order of recording, up to the first damaged page."""

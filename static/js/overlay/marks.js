@@ -10,22 +10,26 @@ const CROSS_PX = 4; // from the middle to an end
 const ARROW = [[-0.7, -0.6], [1, 0], [-0.7, 0.6]]; // of the sensor
 const ARROW_PX = 9;
 const RING_PX = 12;
+const ARC_STEP = 0.05; // rad along the rim of a sector
+const WEDGE = 0.2; // of what fills it
 const THIN = 0.12; // of what fills an ellipse
 const FADED_S = 60; // after which a landmark that is not seen looks its palest
 const PALEST = 0.45;
 const FEW = 40; // landmarks that have room for their numbers
 
 /**
- * Draws a world as it is seen by a look. `view` are the settings, `selection` the ids chosen, `hovered` what is pointed
- * at, `colours` those of methods and tokens. Returns how many ellipses are not drawn at their size: {grown, shrunk}.
+ * Draws a world as it is seen by a look. `view` are the settings, `mask` the sectors left out, `selection` the ids
+ * chosen, `hovered` what is pointed at, `colours` those of methods and tokens. Returns how many ellipses are not drawn
+ * at their size: {grown, shrunk}.
  */
-export function drawMarks(pen, look, world, { view, selection, hovered, colours }) {
+export function drawMarks(pen, look, world, { view, mask, selection, hovered, colours }) {
   const { layers, ellipse_scale: scale } = view;
   const sizes = { grown: 0, shrunk: 0 };
   const ellipses = (entries) => drawEllipses(pen, look, entries, sizes);
   if (layers.landmarks) drawLandmarks(pen, look, world, { ellipses, scale, colours });
   if (layers.rejected) drawRejections(pen, look, world, colours);
   if (layers.pose && world.frame.localization) drawPose(world, { ellipses, scale, colours });
+  if (layers.sensor) for (const sector of mask) drawSector(pen, look, world.sensor, sector, colours);
   if (layers.sensor) drawSensor(pen, look, world.sensor, colours);
   for (const corner of world.corners) {
     if (layers.corners) drawCorner(pen, look, corner, colours);
@@ -96,6 +100,19 @@ function drawRejections(pen, look, { rejections }, { rejected }) {
 function drawPose({ frame, sensor }, { ellipses, scale, colours }) {
   const [[xx, xy], [, yy]] = frame.localization.covariance;
   ellipses([{ at: sensor.at, ...scaled(axesOf([[xx, xy], [xy, yy]]), scale), colour: colours.trail }]);
+}
+
+/** A wedge in which what is near is left out, as it is the robot itself. */
+function drawSector(pen, look, { at, heading }, { first, last, reach }, { sensor }) {
+  const turn = 2 * Math.PI;
+  const width = Math.abs(last - first) >= turn - 1e-9 ? turn : (((last - first) % turn) + turn) % turn;
+  const steps = Math.ceil(width / ARC_STEP);
+  const arc = Array.from({ length: steps + 1 }, (_, k) => heading + first + (width * k) / Math.max(steps, 1));
+  const rim = arc.map((b) => [at[0] + reach * Math.cos(b), at[1] + reach * Math.sin(b)]);
+  const points = [at, ...rim].map((place) => look.toScreen(place));
+  if (!points.every(Boolean)) return;
+  pen.path(points, { fill: sensor, opacity: WEDGE, closed: true });
+  pen.path(points, { stroke: sensor, width: 1, dash: [4, 3], closed: true });
 }
 
 function drawSensor(pen, look, { at, heading }, { sensor }) {

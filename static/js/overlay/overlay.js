@@ -87,12 +87,12 @@ function draw() {
 
 /** Draws all there is with a pen, as seen by a look. */
 export function drawOver(pen, look) {
-  const { view } = get("settings");
+  const { view, sensor } = get("settings");
   const selection = { ...get("selection"), wall: selectedWall(world.frame)?.id };
   const hovered = pointed && thingAt(world, view.layers, look, pointed);
   if (view.layers.grid) drawGrid(pen, look, { ...colours, text: colours.number });
   if (view.layers.segments && plainCamera()) drawWalls(pen, look, world, colours);
-  tell(drawMarks(pen, look, world, { view, selection, hovered, colours }));
+  tell(drawMarks(pen, look, world, { view, mask: sensor.mask ?? [], selection, hovered, colours }));
   if (get("place")) drawPlace(pen, look, get("place"), colours);
   drawMeasure(pen, look, colours);
   showHover([hovered, pointed && speckAt(get("around"), view.layers, look, pointed)].filter(Boolean), pointed);

@@ -1,4 +1,4 @@
-"""The noise of each sensor: set for one, it is not used for another, and a device is known again."""
+"""Noise and mask of each sensor: set for one, it is not used for another, and a device is known again."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,17 +6,21 @@ from pathlib import Path
 import numpy as np
 from lidarcore_app.jobs.sensor_memory import MOST, SensorMemory
 from lidarcore_app.pipeline.noise_watch import SCANS
-from lidarcore_app.pipeline.sensor_noises import SensorNoises
+from lidarcore_app.pipeline.sensor_setups import SensorSetup, SensorSetups
 from lidarcore_app.sources.live import DeviceOptions
 from lidarcore_app.sources.recorded import RecordingSource
 from lidarcore_app.sources.simulated import SimulationSource
 from serving import Server, write_room
 
 from lidarcore import SensorNoise
+from lidarcore.body_mask import MOST_SECTORS, Sector
 from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.simulation.settings import SimulationSettings
 
 NOISE, OTHER = SensorNoise(0.007, 0.002, unevenness=0.003), SensorNoise(0.011, 0.004)
+MASK = (Sector(2.0, -2.5, 0.4), Sector(0.1, 0.2, 0.3))
+SETUP = SensorSetup(NOISE, MASK)
+FULL = SensorSetup(NOISE, tuple(Sector(k / 7, (k + 1) / 7, 1 / 3) for k in range(MOST_SECTORS)))
 
 
 class Device(SimulationSource):
@@ -38,20 +42,20 @@ def test_each_source_has_the_noise_that_was_set_for_it(tmp_path: Path) -> None:
     write_room(tmp_path / "b.npz", scans=2)
     one, two = (RecordingSource(tmp_path / name) for name in ("a.npz", "b.npz"))
     simulated = SimulationSource(SimulationSettings(noise=OTHER))
-    noises = SensorNoises(SensorMemory(tmp_path / "sensors.json"))
-    assert noises.of(simulated) == OTHER
-    noises.tell(one, NOISE)
-    assert noises.of(one) == NOISE
-    assert noises.of(two) == SensorNoise()
+    setups = SensorSetups(SensorMemory(tmp_path / "sensors.json"))
+    assert setups.of(simulated) == SensorSetup(OTHER)
+    setups.tell(one, SETUP)
+    assert setups.of(one) == SETUP
+    assert setups.of(two) == SensorSetup(SensorNoise())
     assert not (tmp_path / "sensors.json").exists()
 
 
 def test_a_device_is_known_again_after_a_restart_by_its_serial_number(tmp_path: Path) -> None:
     file = tmp_path / "new" / "sensors.json"
-    SensorNoises(SensorMemory(file)).tell(Device("A"), NOISE)
-    again = SensorNoises(SensorMemory(file))
-    assert again.of(Device("A")) == NOISE
-    assert again.of(Device("B")) == Device("B").noise
+    SensorSetups(SensorMemory(file)).tell(Device("A"), SETUP)
+    again = SensorSetups(SensorMemory(file))
+    assert again.of(Device("A")) == SETUP
+    assert again.of(Device("B")) == SensorSetup(Device("B").noise)
 
 
 def test_a_damaged_memory_is_as_good_as_none_and_it_never_grows_beyond_its_bound(tmp_path: Path) -> None:
@@ -59,9 +63,20 @@ def test_a_damaged_memory_is_as_good_as_none_and_it_never_grows_beyond_its_bound
     memory.file.write_text('{"device S1 A": {"sigma_range": -1}}')
     assert memory.recall("device S1 A") is None
     for k in range(MOST + 3):
-        memory.remember(f"device {k}", NOISE)
+        memory.remember(f"device {k}", FULL)
     assert memory.recall("device 2") is None
-    assert memory.recall("device 3") == memory.recall(f"device {MOST + 2}") == NOISE
+    assert memory.recall("device 3") == memory.recall(f"device {MOST + 2}") == FULL
+
+
+def test_a_memory_of_noises_alone_is_still_known(tmp_path: Path) -> None:
+    memory = SensorMemory(tmp_path / "sensors.json")
+    memory.file.write_text(
+        '{"device S1 A": {"sigma_range": 0.007, "sigma_bearing": 0.002, "unevenness": 0.003}}'
+    )
+    assert memory.recall("device S1 A") == SensorSetup(NOISE)
+    memory.remember("device S1 B", SETUP)
+    assert memory.recall("device S1 A") == SensorSetup(NOISE)
+    assert memory.recall("device S1 B") == SETUP
 
 
 def test_another_recording_begins_with_a_noise_of_its_own(make_server: Callable[..., Server]) -> None:
@@ -96,6 +111,6 @@ def test_the_emulated_sensor_begins_with_the_noise_it_has(make_server: Callable[
 
 def test_without_a_memory_that_can_be_written_the_session_goes_on(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    noises = SensorNoises(SensorMemory(tmp_path / "file" / "sensors.json"))
-    noises.tell(Device("A"), NOISE)
-    assert noises.of(Device("A")) == NOISE
+    setups = SensorSetups(SensorMemory(tmp_path / "file" / "sensors.json"))
+    setups.tell(Device("A"), SETUP)
+    assert setups.of(Device("A")) == SETUP

@@ -1,0 +1,87 @@
+"""What tells a wall from all others, however the map is bent: which stretches of which segments it was seen by.
+
+A segment is found in the scan of one keyframe, so its number and where it begins do not change with any pose.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.mapping.grid.occupancy import Mask
+from lidarcore.mapping.walls.parts import Part
+from lidarcore.mapping.walls.pieces import Pieces
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sightings:
+    """N stretches of segments, each seen of one wall.
+
+    wall     (N,) which; a segment may have been seen of several, one beside the other
+    segment  (N,) number of the segment among those of all keyframes
+    span     (N, 2) m along the segment, from its first end
+    """
+
+    wall: Ints
+    segment: Ints
+    span: Array
+
+    def __len__(self) -> int:
+        return len(self.wall)
+
+    @classmethod
+    def none(cls) -> "Sightings":
+        """Of no wall."""
+        return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2)))
+
+    @classmethod
+    def of(cls, pieces: Pieces, parts: Sequence[Part]) -> "Sightings":
+        """Of walls by their place in the list: of each of its segments what lies between its ends."""
+        found = [cls.none()]
+        for i, part in enumerate(parts):
+            t, _ = part.fit.coordinates(pieces.ends[part.members])
+            first = t.min(axis=1, keepdims=True)
+            span = np.clip([part.low, part.high], first, t.max(axis=1, keepdims=True)) - first
+            on = span[:, 1] > span[:, 0]
+            found.append(cls(np.full(on.sum(), i), part.members[on], span[on]))
+        return cls.joined(found)
+
+    @classmethod
+    def joined(cls, several: Sequence["Sightings"]) -> "Sightings":
+        """All of them, one after the other."""
+        return cls(
+            np.concatenate([one.wall for one in several]),
+            np.concatenate([one.segment for one in several]),
+            np.concatenate([one.span for one in several]),
+        )
+
+    def where(self, chosen: Mask) -> "Sightings":
+        """Those (N,) that are chosen."""
+        return Sightings(self.wall[chosen], self.segment[chosen], self.span[chosen])
+
+    def renamed(self, names: Ints) -> "Sightings":
+        """With names[i] for wall i."""
+        return Sightings(names[self.wall], self.segment, self.span)
+
+    def lengths(self, walls: int) -> Array:
+        """How much (W,) m of segments was seen of each of so many walls, each segment for itself."""
+        total: Array = np.bincount(self.wall, np.diff(self.span)[:, 0], walls).astype(np.float64)
+        return total
+
+
+def common(before: Sightings, now: Sightings, shape: tuple[int, int]) -> csr_array:
+    """How much (B, N) m of segments the walls of both have in common, each segment for itself."""
+    order = np.argsort(now.segment, kind="stable")
+    sought = now.segment[order]
+    first = np.searchsorted(sought, before.segment, "left")
+    count = np.searchsorted(sought, before.segment, "right") - first
+    i = np.repeat(np.arange(len(before)), count)
+    j = order[np.arange(len(i)) - np.repeat(np.cumsum(count) - count, count) + np.repeat(first, count)]
+    low = np.maximum(before.span[i, 0], now.span[j, 0])
+    high = np.minimum(before.span[i, 1], now.span[j, 1])
+    shared = np.maximum(high - low, 0.0)
+    result = csr_array((shared, (before.wall[i], now.wall[j])), shape=shape)  # adds up what is at one place
+    result.eliminate_zeros()
+    return result
