@@ -43,7 +43,7 @@ def find_corners(
 
     They make a corner if the angle is large enough and the facing ends are within corner_gap of the
     intersection, beyond the spacing of the points at that end (a wall seen at a grazing angle ends early)
-    and what the intersection may be off by noise.
+    and what the intersection may be off from the true one.
     """
     n_corners = 0
     for j in range(n_segments if n_segments > 2 else n_segments - 1):
@@ -61,7 +61,7 @@ def find_corners(
         beyond = max(
             _distance(row, first, END) - first[END_SPACING],
             _distance(row, second, START) - second[START_SPACING],
-        ) - _SIGMAS * np.sqrt(row[CORNER_CONSISTENT] + row[CORNER_CONSISTENT + 3])  # fmt: skip
+        ) - _SIGMAS * np.sqrt(row[CORNER_MAP] + row[CORNER_MAP + 3])  # fmt: skip
         if beyond > corner_gap:
             reject(
                 rejections[n_rejections], TOO_FAR, first[LAST_BEAM], second[FIRST_BEAM],

@@ -30,7 +30,7 @@ SENSORS: dict[str, SensorKind] = {
             unevenness=0.0035,
             unevenness_length=0.12,
             tails=0.25,
-            renewal=0.65,
+            renewal=0.1,
             resampling=1.0,
         ),
         "Medians of the calibrations of 14 places in three recordings (rplidar_csv_rooms), from 300 scans each of a "

@@ -4,7 +4,7 @@ import errno
 import json
 import signal
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -100,13 +100,18 @@ def _patch(assignment: str) -> dict[str, Any]:
     name, equals, text = assignment.partition("=")
     if not equals:
         raise typer.BadParameter(f"{assignment!r} should be NAME=VALUE, e.g. gap=0.2.")
-    try:
-        patch = json.loads(text)
-    except json.JSONDecodeError:
-        patch = text
+    patch = _value(text)
     path = name.split(".")
     if path[0] not in Settings.model_fields:
         path.insert(0, "extraction")
     for part in reversed(path):
         patch = {part: patch}
     return dict(patch)
+
+
+def _value(text: str) -> Any:
+    """JSON, or a number as people write it (.01), or else the text itself."""
+    for read in (json.loads, float):
+        with suppress(ValueError):
+            return read(text)
+    return text

@@ -1,4 +1,4 @@
-"""The landmarks of all runs in a file: the running map goes into it beside the live view, which never waits for it."""
+"""The maps of all runs in a file: the running one goes into it beside the live view, which never waits for it."""
 
 import logging
 import threading
@@ -6,15 +6,19 @@ import time
 from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from lidarcore.errors import LidarError, MapFileError, UnknownLandmarkError, UnknownSessionError
 from lidarcore.landmarks import Atlas, LandmarkMap, Session
-from lidarcore.localization import Landmarks, from_stored
+from lidarcore.localization import Landmarks
+from lidarcore.localization import from_stored as landmarks_from_stored
+from lidarcore.mapping.walls import WallTable
 
 from ..threads import join
 from .map_file import landmarks_of
 from .map_writer import MapChange, MapWriter
+from .wall_writer import WallWriter, from_stored
 
 PATIENCE = 2.0  # s to wait while another process writes
 PAUSE = 0.25  # s between two transactions: how far the disk may be behind
@@ -41,29 +45,31 @@ class StoreStatus:
 
 @dataclass(frozen=True, slots=True)
 class _Waiting:
-    """The newest map of a run, and since when something has waited to be written."""
+    """What writes the newest map of a run, for the last time or not, and since when something has waited for that."""
 
-    landmarks: Landmarks
-    method: str
+    write: Callable[[bool], MapChange | None]
     ended: bool
     since: float
 
 
-class LandmarkRun:
+class _StoredRun:
     """One run of SLAM as it goes into the file. Every method returns at once.
 
     `replay` is equal for runs that lead to the same map, as when a recording is repeated; else None.
     """
 
     def __init__(
-        self, writer: MapWriter, schedule: Callable[["LandmarkRun", _Waiting], None], replay: Hashable = None
+        self,
+        writer: MapWriter | WallWriter,
+        schedule: Callable[["_StoredRun", _Waiting], None],
+        replay: Hashable = None,
     ) -> None:
         self.writer, self.replay, self._schedule = writer, replay, schedule
-        self._newest: tuple[Landmarks, str] | None = None
+        self._newest: Callable[[bool], MapChange | None] | None = None
 
     @property
     def session(self) -> int | None:
-        """The session in the file; None until its first landmark is on the disk."""
+        """The session in the file; None until something of the map is on the disk."""
         return self.writer.session
 
     @property
@@ -71,15 +77,34 @@ class LandmarkRun:
         """Ids in the file of the landmarks on the disk, by those of the navigator."""
         return self.writer.ids
 
-    def put(self, landmarks: Landmarks, method: str = "") -> None:
-        """Write the map as it is now, unless a newer one comes first; `method` is what found its landmarks."""
-        self._newest = landmarks, method
-        self._schedule(self, _Waiting(*self._newest, ended=False, since=time.monotonic()))
-
     def end(self) -> None:
         """Write what is left, and that the run has ended."""
         if self._newest:
-            self._schedule(self, _Waiting(*self._newest, ended=True, since=time.monotonic()))
+            self._schedule(self, _Waiting(self._newest, ended=True, since=time.monotonic()))
+
+    def _put(self, write: Callable[[bool], MapChange | None]) -> None:
+        self._newest = write
+        self._schedule(self, _Waiting(write, ended=False, since=time.monotonic()))
+
+
+class LandmarkRun(_StoredRun):
+    """A map of landmarks."""
+
+    writer: MapWriter
+
+    def put(self, landmarks: Landmarks, method: str = "") -> None:
+        """Write the map as it is now, unless a newer one comes first; `method` is what found its landmarks."""
+        self._put(partial(self.writer.write, landmarks, method))
+
+
+class WallRun(_StoredRun):
+    """A map of walls."""
+
+    writer: WallWriter
+
+    def put(self, walls: WallTable) -> None:
+        """Write the confirmed walls as they are now, unless newer ones come first."""
+        self._put(partial(self.writer.write, walls))
 
 
 class LandmarkStore:
@@ -94,10 +119,10 @@ class LandmarkStore:
         self.atlas = Atlas(url, PATIENCE)
         self.listeners: list[Callable[[MapChange], None]] = []
         self.error: str | None = None
-        self._run: LandmarkRun | None = None
+        self._run: _StoredRun | None = None
         self._used: int | None = None
         self._finished: dict[Hashable, int] = {}  # by what is replayed, the session of its last finished map
-        self._waiting: dict[LandmarkRun, _Waiting] = {}
+        self._waiting: dict[_StoredRun, _Waiting] = {}
         self._writing: _Waiting | None = None
         self._news = threading.Condition()
         self._closing = threading.Event()
@@ -138,8 +163,18 @@ class LandmarkStore:
         Of runs with the same `replay`, which lead to the same map, the last one that was finished is kept.
         """
         self.use(None)
-        self._run = LandmarkRun(MapWriter(self.atlas, source, mode), self._schedule, replay)
-        return self._run
+        self._run = run = LandmarkRun(MapWriter(self.atlas, source, mode), self._schedule, replay)
+        return run
+
+    def begin_walls(self, source: str, replay: Hashable = None) -> WallRun:
+        """Likewise a run whose map is one of walls."""
+        self.use(None)
+        self._run = run = WallRun(WallWriter(self.atlas, source, "slam"), self._schedule, replay)
+        return run
+
+    def walls(self, session: int) -> WallTable:
+        """The walls that a session has in the file. Raises UnknownSessionError."""
+        return from_stored(self.atlas[session].walls())
 
     def use(self, session: int | None) -> None:
         """The run ends; questions that name no session are about this one now, or about the newest if it is None."""
@@ -157,7 +192,7 @@ class LandmarkStore:
 
     def landmarks(self, session: int) -> Landmarks:
         """The map of a session to localize in, with the ids of the file. Raises UnknownSessionError."""
-        return from_stored(self.atlas[session])
+        return landmarks_from_stored(self.atlas[session])
 
     def load(self, path: Path, format: str, name: str) -> Session:
         """A file of a map (one of FORMATS) as a session of its own. Raises MapFileError; nothing is kept of it then.
@@ -185,11 +220,11 @@ class LandmarkStore:
         found = self.atlas.newest()
         return found.session if found else None
 
-    def _schedule(self, run: LandmarkRun, newest: _Waiting) -> None:
-        """Have the newest map of a run written in its turn."""
+    def _schedule(self, run: _StoredRun, newest: _Waiting) -> None:
+        """Have the newest map of a run written in its turn; that the run has ended is not forgotten."""
         with self._news:
             before = self._waiting.pop(run, newest)
-            self._waiting[run] = replace(newest, since=before.since)
+            self._waiting[run] = replace(newest, since=before.since, ended=newest.ended or before.ended)
             while len(self._waiting) > MOST_RUNS:
                 del self._waiting[next(iter(self._waiting))]
             self._news.notify()
@@ -209,10 +244,10 @@ class LandmarkStore:
                 return
             self._closing.wait(pause)
 
-    def _attempt(self, run: LandmarkRun, waiting: _Waiting) -> float:
+    def _attempt(self, run: _StoredRun, waiting: _Waiting) -> float:
         """Write, and tell; how long to wait before the next time, s."""
         try:
-            change = run.writer.write(waiting.landmarks, waiting.method, waiting.ended)
+            change = waiting.write(waiting.ended)
             if waiting.ended:
                 run.writer.end()
                 self._replace_earlier(run)
@@ -227,7 +262,7 @@ class LandmarkStore:
             return RETRY
         return PAUSE if change else 0.0
 
-    def _replace_earlier(self, run: LandmarkRun) -> None:
+    def _replace_earlier(self, run: _StoredRun) -> None:
         """Give up the map of the run before with the same `replay`, unless it is in use."""
         if run.replay is None or run.session is None:
             return
@@ -240,7 +275,7 @@ class LandmarkStore:
         for listener in self.listeners:
             listener(change)
 
-    def _put_back(self, run: LandmarkRun, waiting: _Waiting, error: LidarError) -> float:
+    def _put_back(self, run: _StoredRun, waiting: _Waiting, error: LidarError) -> float:
         """It waits on if nothing newer does; but a map that was deleted does not come back when its run has ended."""
         is_deleted = isinstance(error, UnknownLandmarkError | UnknownSessionError)
         if not (is_deleted and waiting.ended):

@@ -13,6 +13,7 @@ from lidarcore.errors import LandmarkMapError
 from lidarcore.geometry import check_covariance
 from lidarcore.localization import Landmarks, NavigationSettings, Navigator, as_pose
 from lidarcore.mapping import MapPicture, WholeScans
+from lidarcore.mapping.walls import WallTable
 
 from ..errors import ConflictError
 from ..sources.odometry_feed import OdometryFeed, OdometryStatus
@@ -31,11 +32,21 @@ NOT_MOVED = (
 NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."
 
 
+class WallRun(Protocol):
+    """Where the walls of one run are kept."""
+
+    def put(self, walls: WallTable) -> None:
+        """Keep them as they are now; returns at once."""
+
+
 class MapStore(Protocol):
     """Where maps are kept, each in a session of its own."""
 
     def begin(self, source: str, *, replay: Hashable) -> MapRun:
         """An empty map, to be built; in place of the last one with that `replay`, unless it is None."""
+
+    def begin_walls(self, source: str, *, replay: Hashable) -> WallRun:
+        """Likewise a map of walls."""
 
     def use(self, session: int | None) -> None:
         """No map is built any more; that of a session is used, if one is given."""
@@ -175,13 +186,14 @@ class Navigation:
             return run
         self._drop_run()
         self.problem = None
+        replay = (timed.name, wanted) if timed.position.kind == "recording" else None
         if wanted.mode == "slam" and wanted.method == "scans":
-            self._store.use(None)
-            navigator = WholeScans(settings.extraction)
+            navigator = WholeScans(
+                settings.extraction, lambda: self._store.begin_walls(timed.name, replay=replay).put
+            )
             self._run = Run(timed.source, wanted, navigator, None, None, Trails(own_frame=True))
             self._placed = None
         elif wanted.mode == "slam":
-            replay = (timed.name, wanted) if timed.position.kind == "recording" else None
             written = self._store.begin(timed.name, replay=replay)
             self._run = Run(timed.source, wanted, Navigator(wanted), written, None, Trails(own_frame=True))
         elif wanted.mode == "localize":

@@ -11,7 +11,8 @@ from lidarcore.landmarks.landmark_map import LandmarkMap, purge
 from lidarcore.landmarks.queries import check_finite
 
 _SESSIONS = """SELECT id, source, mode, started, ended,
-    (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id) FROM sessions"""
+    (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id),
+    (SELECT count(*) FROM walls WHERE walls.session = sessions.id) FROM sessions"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +22,7 @@ class Session:
     source, mode    where they come from ("room.mcap") and how ("slam", "import")
     started, ended  s since 1970, by the computer's clock; `ended` None while it runs or if it was killed
     landmarks       how many there are
+    walls           likewise
     """
 
     id: int
@@ -29,6 +31,7 @@ class Session:
     started: float
     ended: float | None
     landmarks: int
+    walls: int = 0
 
 
 class Atlas:
@@ -122,6 +125,7 @@ class Atlas:
         with self._database.writing() as connection:
             if not connection.execute("DELETE FROM sessions WHERE id = ?", (session,)).rowcount:
                 raise _unknown(session)
+            connection.execute("DELETE FROM walls WHERE session = ?", (session,))
         with self._database.reading() as connection:
             left = connection.execute(
                 "SELECT session FROM extents WHERE session NOT IN (SELECT id FROM sessions)"

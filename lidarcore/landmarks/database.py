@@ -75,6 +75,17 @@ _MIGRATIONS: tuple[tuple[str, ...], ...] = (
         "DROP TABLE old_history",
         "CREATE INDEX history_by_session ON history (session)",
     ),
+    (  # walls stand in a map beside landmarks
+        """CREATE TABLE walls (
+            session INTEGER NOT NULL, id INTEGER NOT NULL, alpha REAL NOT NULL, r REAL NOT NULL,
+            var_alpha REAL NOT NULL, cov_alpha_r REAL NOT NULL, var_r REAL NOT NULL,
+            x1 REAL NOT NULL, y1 REAL NOT NULL, x2 REAL NOT NULL, y2 REAL NOT NULL,
+            length REAL NOT NULL, var_length REAL NOT NULL,
+            ended_1 INTEGER NOT NULL, ended_2 INTEGER NOT NULL,
+            corner_1 INTEGER NOT NULL, corner_2 INTEGER NOT NULL,
+            first_seen REAL NOT NULL, last_seen REAL NOT NULL, count INTEGER NOT NULL,
+            PRIMARY KEY (session, id)) STRICT, WITHOUT ROWID""",
+    ),
 )
 
 

@@ -3,11 +3,13 @@
 import math
 import sqlite3
 from collections.abc import Iterable, Iterator
+from dataclasses import astuple
 from typing import get_args
 
 from numpy.typing import ArrayLike
 
 from lidarcore.errors import LandmarkError, UnknownLandmarkError, UnknownSessionError
+from lidarcore.landmarks import wall
 from lidarcore.landmarks.database import Database
 from lidarcore.landmarks.landmark import COLUMNS, Landmark, as_covariance, as_position
 from lidarcore.landmarks.nearest import Metric, Neighbour, Neighbourhood
@@ -22,6 +24,7 @@ from lidarcore.landmarks.queries import (
     check_order,
     find,
 )
+from lidarcore.landmarks.wall import StoredWall
 
 _ALL = Filter()
 _STATE = ", ".join(COLUMNS[:-1])  # all but the id
@@ -44,11 +47,13 @@ _WIDEN = (
     )
 )
 _IN_SESSION = f"SELECT {SELECTED} FROM landmarks WHERE session = :session"
+_WALLS = ", ".join(wall.COLUMNS)
+_WALL_VALUES = ", ".join("?" for _ in wall.COLUMNS)
 _AT_ONCE = 1000  # landmarks, and states of some, that one transaction gives up: others wait no longer
 
 
 class LandmarkMap:
-    """The landmarks of one session, in metres in its world frame. An Atlas makes it.
+    """The landmarks, and the walls, of one session, in metres in its world frame. An Atlas makes it.
 
     What `put` was given is on the disk when it returns. History keeps the last state of a landmark within each second
     of its last_seen.
@@ -84,11 +89,30 @@ class LandmarkMap:
         map, UnknownSessionError if the session was deleted.
         """
         with self._database.writing() as connection:
-            if not connection.execute("SELECT 1 FROM sessions WHERE id = ?", (self.session,)).fetchone():
-                raise UnknownSessionError(f"Session {self.session} was deleted: begin another one.")
+            self._check(connection)
             for id in without:
                 self._remove(connection, id)
             return self.store(connection, landmarks)
+
+    def put_walls(self, walls: Iterable[StoredWall]) -> None:
+        """Store walls in place of those that the map has, all or none. Raises UnknownSessionError if it was deleted."""
+        with self._database.writing() as connection:
+            self._check(connection)
+            connection.execute("DELETE FROM walls WHERE session = ?", (self.session,))
+            connection.executemany(
+                f"INSERT INTO walls (session, {_WALLS}) VALUES (?, {_WALL_VALUES})",
+                ((self.session, *astuple(one)) for one in walls),
+            )
+
+    def walls(self) -> list[StoredWall]:
+        """All walls in the order of their ids."""
+        query = f"SELECT {_WALLS} FROM walls WHERE session = ? ORDER BY id"
+        with self._database.reading() as connection:
+            return [StoredWall(*row) for row in connection.execute(query, (self.session,))]
+
+    def _check(self, connection: sqlite3.Connection) -> None:
+        if not connection.execute("SELECT 1 FROM sessions WHERE id = ?", (self.session,)).fetchone():
+            raise UnknownSessionError(f"Session {self.session} was deleted: begin another one.")
 
     def store(self, connection: sqlite3.Connection, landmarks: Iterable[Landmark]) -> list[int]:
         """What `put` does, within a transaction."""

@@ -12,7 +12,13 @@ from lidarcore.lines.regression import Normal, Sym2, Work
 from lidarcore.noise import NoiseModel
 
 _PRIOR_WEIGHT = 4.0  # of a room's unevenness against the independent stretches of one wall
-_GROSS = 9.0  # variances: a residual counts for no more in a wall's own unevenness
+_GROSS = (
+    9.0  # variances: a residual, or a step between neighbours, counts for no more in what is a wall's own
+)
+_ROUGH_WEIGHT = 16.0  # of the roughness expected against the beams of one wall
+_SMOOTHEST = 0.25  # of the variance expected: ranges may also be alike because the sensor smooths them
+
+_NOTHING: Sym2 = (0.0, 0.0, 0.0)
 
 Regression = tuple[float, float, float]  # sum of weights, weighted mean of t, centred second moment of t
 
@@ -59,27 +65,21 @@ def covariances(
     if noise.v_wall == 0 and noise.v_systematic == 0:
         here = _at_sensor(white, mean)
         return here, here
-    pattern, elsewhere, off = _pattern(work, rho, c, s, noise, normal, (a0, mean, d), white)
-    anew = _mixed(white, noise.renewal, pattern, (1 - noise.renewal) * noise.resampling, elsewhere)
+    pattern, elsewhere, roughness, off = _pattern(work, rho, c, s, noise, normal, (a0, mean, d), white)
+    anew = _plus(white, 1.0, pattern)
+    same = _plus(white, noise.resampling, elsewhere)
+    repeated = _plus(_plus(_NOTHING, (1 - noise.renewal) * roughness, same), noise.renewal, anew)
     half, t_m = off
     tilt = noise.v_systematic / (half * half)
     lever = t_m - mean  # of the wall's middle, about which it is tilted
-    truth = (
-        white[0] + pattern[0] + tilt,
-        white[1] + pattern[1] + lever * tilt,
-        white[2] + pattern[2] + noise.v_systematic + lever * lever * tilt,
-    )
-    return _at_sensor(anew, mean), _at_sensor(truth, mean)
+    systematic = (tilt, lever * tilt, noise.v_systematic + lever * lever * tilt)
+    return _at_sensor(repeated, mean), _at_sensor(_plus(anew, 1.0, systematic), mean)
 
 
 @inlined
-def _mixed(white: Sym2, p: float, pattern: Sym2, q: float, elsewhere: Sym2) -> Sym2:
-    """white + p pattern + q elsewhere"""
-    return (
-        white[0] + p * pattern[0] + q * elsewhere[0],
-        white[1] + p * pattern[1] + q * elsewhere[1],
-        white[2] + p * pattern[2] + q * elsewhere[2],
-    )
+def _plus(a: Sym2, share: float, b: Sym2) -> Sym2:
+    """a + share b"""
+    return a[0] + share * b[0], a[1] + share * b[1], a[2] + share * b[2]
 
 
 @inlined
@@ -99,14 +99,18 @@ def _pattern(
     normal: Normal,
     sums: Regression,
     white: Sym2,
-) -> tuple[Sym2, Sym2, tuple[float, float]]:
+) -> tuple[Sym2, Sym2, float, tuple[float, float]]:
     """Covariances of (alpha, height over the mean) by this wall's unevenness: of all of it, and of what beams that fall
-    elsewhere on it make of it; and half the wall's length and its middle (m)."""
+    elsewhere on it make of it; its roughness; half its length and its middle (m).
+
+    Roughness is by how much neighbouring beams differ, over the variance expected of that: some walls, and beams at
+    some incidence, are far noisier than others in one room.
+    """
     w, t, decay = work
     nx, ny, r = normal
     a0, mean, d = sums
     n = len(rho)
-    residual = expected = 0.0
+    residual = expected = steps = v_before = e_before = 0.0
     for i in range(n):
         across, along = nx * c[i] + ny * s[i], nx * s[i] - ny * c[i]
         at = r * along / across - mean
@@ -118,6 +122,11 @@ def _pattern(
         ) ** 2
         residual += w[i] * min(e * e, _GROSS * (v + noise.v_wall))
         expected += w[i] * v
+        if i > 0:
+            alike = _exp_negative(np.abs(at - t[i - 1]) / noise.length)
+            step, of_step = e - e_before, v + v_before + 2 * noise.v_wall * (1 - alike)
+            steps += min(step * step / of_step, _GROSS)
+        v_before, e_before = v, e
     k00, k01, k11 = unevenness_sums(w, t, decay, noise.length)
     # The wall's own variance, from what its residuals have beyond the beams' noise; a line takes out a part of both.
     seen = residual - (expected - white[2] * a0 - white[0] * d)
@@ -129,9 +138,10 @@ def _pattern(
     pattern = _gained(v_wall, k00, k01, k11, a0, d)
     elsewhere = pattern
     if noise.renewal < 1 and noise.resampling > 0:
-        l00, l01, l11 = resampled_sums(w, t, noise.length)
+        l00, l01, l11 = resampled_sums(w, t, decay, noise.length)
         elsewhere = _gained(v_wall, l00, l01, l11, a0, d)
-    return pattern, elsewhere, (np.abs(t[n - 1] - t[0]) / 2, (t[n - 1] + t[0]) / 2 + mean)
+    roughness = max((steps * n / (n - 1) + _ROUGH_WEIGHT) / (n + _ROUGH_WEIGHT), _SMOOTHEST)
+    return pattern, elsewhere, roughness, (np.abs(t[n - 1] - t[0]) / 2, (t[n - 1] + t[0]) / 2 + mean)
 
 
 @inlined
@@ -141,13 +151,14 @@ def _gained(v: float, k00: float, k01: float, k11: float, a0: float, d: float) -
 
 
 @inlined
-def resampled_sums(w: Array, t: Array, length: float) -> tuple[float, float, float]:
+def resampled_sums(w: Array, t: Array, decay: Array, length: float) -> tuple[float, float, float]:
     """The same sums as `unevenness_sums` of what differs if all beams fall elsewhere between their neighbours.
 
     With a = spacing / (2 length), and a shift of all beams that is anywhere within the spacing, the covariance of two
     such samples of one wall is that of the process times sinh(a) / a, but (1 - exp(-a)) / a of a beam with itself. What
     they do not share, summed over the neighbours, is a variance of coth(a) - 1 / a for each beam, independent: a / 3
-    where beams are dense, which hardly miss anything between them, 1 where they are far apart.
+    where beams are dense, which hardly miss anything between them, 1 where they are far apart. At either end such a
+    shift also brings beams or takes them away: two there are counted as found anew.
     """
     n = len(t)
     l00 = l01 = l11 = 0.0
@@ -159,6 +170,9 @@ def resampled_sums(w: Array, t: Array, length: float) -> tuple[float, float, flo
         l00 += v
         l01 += v * t[i]
         l11 += v * t[i] * t[i]
+    for i in (0, n - 2):
+        e00, e01, e11 = unevenness_sums(w[i : i + 2], t[i : i + 2], decay[i : i + 2], length)
+        l00, l01, l11 = l00 + e00, l01 + e01, l11 + e11
     return l00, l01, l11
 
 

@@ -2,6 +2,7 @@
 
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,9 +42,18 @@ class MapPicture:
 
 
 class MapWorker:
-    """Takes keyframes; `corrected` and `picture` are replaced whole, and may be read from any thread."""
+    """Takes keyframes; `corrected` and `picture` are replaced whole, and may be read from any thread.
 
-    def __init__(self, settings: MapperSettings, extraction: ExtractionSettings) -> None:
+    keep  called with the walls, in the thread of the map, each time that they were found
+    """
+
+    def __init__(
+        self,
+        settings: MapperSettings,
+        extraction: ExtractionSettings,
+        keep: Callable[[Walls], None] | None = None,
+    ) -> None:
+        self._keep = keep
         self.corrected = Corrected(np.zeros((1, 3)), np.zeros((3, 3)))
         self.picture: MapPicture | None = None
         self._extraction = extraction
@@ -107,7 +117,9 @@ class MapWorker:
         self.picture = MapPicture(grid, self.picture.walls if self.picture else None)
         begin = time.monotonic()
         if begin >= self._next_walls:
-            self.picture = MapPicture(grid, self._walls(grid))
+            self.picture = MapPicture(grid, walls := self._walls(grid))
+            if self._keep:
+                self._keep(walls)
             end = time.monotonic()
             self._next_walls = end + _REST * (end - begin)
 

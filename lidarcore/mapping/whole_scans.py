@@ -1,5 +1,6 @@
 """SLAM from whole scans: each one is laid on the last keyframes at once, and the map behind is bent meanwhile."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from lidarcore.localization.tracking_result import State, goes_on
 from lidarcore.mapping.front import FrontEnd, Tracked
 from lidarcore.mapping.map_worker import MapPicture, MapWorker
 from lidarcore.mapping.settings import VAGUE, MapperSettings
+from lidarcore.mapping.walls import Walls
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
@@ -37,11 +39,18 @@ class WholeScans:
     """Says where each scan was taken, and builds the map of them in the background; used as a `Navigator` is.
 
     extraction  noise of the sensor, and how walls are found
+    begin_map   called where a map begins; what it gives is called with the walls each time that they were found, in a
+                thread of its own
 
     A thread runs until `close`.
     """
 
-    def __init__(self, extraction: ExtractionSettings | None = None) -> None:
+    def __init__(
+        self,
+        extraction: ExtractionSettings | None = None,
+        begin_map: Callable[[], Callable[[Walls], None]] | None = None,
+    ) -> None:
+        self._begin_map = begin_map
         self._extraction = extraction = extraction or ExtractionSettings()
         self._settings = MapperSettings().with_noise(extraction.noise)
         self._distortion, self._reckoning = Distortion(), DeadReckoning()
@@ -107,7 +116,7 @@ class WholeScans:
 
     def _begin(self) -> None:
         self._front = FrontEnd(self._settings.front)
-        self._worker = MapWorker(self._settings, self._extraction)
+        self._worker = MapWorker(self._settings, self._extraction, self._begin_map and self._begin_map())
         self._ways: list[UncertainPose] = []  # to each keyframe from the one before it
         self._last = self._velocity = None
 

@@ -80,24 +80,27 @@ function rows(sessions, { error }, live) {
   ];
 }
 
-function row({ id, source, mode, started, landmarks }, live) {
+function row({ id, source, mode, started, landmarks, walls }, live) {
   const isUsed = id === live.session;
   const count = isUsed ? Math.max(landmarks, live.landmarks) : landmarks;
+  const holds = walls ? `${wholeNumber(walls)} walls` : `${wholeNumber(count)} landmarks`;
   const button = el(
     "button",
     {
       type: "button",
       class: "entry",
-      title: `Localize in map ${id}`,
+      title: walls ? "Walls cannot be localized in yet" : `Localize in map ${id}`,
+      disabled: walls > 0,
       "data-key": `map-${id}`,
       onclick: () => localizeIn(id),
     },
     el("span", {}, `Map ${id}`),
-    el("small", {}, `${wholeNumber(count)} landmarks`),
+    el("small", {}, holds),
   );
   if (isUsed) button.setAttribute("aria-current", "true");
   const about = [source, mode === "import" ? "loaded" : null, moment(started)].filter(Boolean).join(", ");
-  const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, count));
+  const lost = walls ? holds : `${holds} and their history`;
+  const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, lost));
   return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
 }
 
@@ -133,12 +136,12 @@ async function localizeIn(session) {
   if (chosen) await changeSetting("navigation.mode", "localize");
 }
 
-function confirmDelete(session, count) {
+function confirmDelete(session, lost) {
   const remove = async () => {
     await attempt(() => request("DELETE", `sessions/${session}`), "The map was not deleted");
     await list();
   };
-  toast(`This also deletes its ${wholeNumber(count)} landmarks and their history.`, {
+  toast(`This also deletes its ${lost}.`, {
     title: `Delete map ${session}?`,
     action: { label: "Delete", run: remove },
     linger: QUESTION_MS,

@@ -118,7 +118,8 @@ def test_looks_that_share_nothing_have_no_differences():
 def test_neighbouring_real_stations_agree_once_the_systematic_part_is_known(data, tmp_path):
     """It is told by one half of the pairs of stations and judged on the other; it only ever adds to what is claimed.
 
-    Here it is nothing: unevenness, as it was found at each station, explains by itself what differs between them.
+    Here it is nothing: unevenness, as it was found at each station, explains by itself what differs between them. What
+    repeats from scan to scan is another question: ellipses for it are too small between stations.
     """
     output = tmp_path / "agreement.json"
     recording = data / "rplidar_csv_rooms" / "mapping_keng.csv.gz"
@@ -126,7 +127,7 @@ def test_neighbouring_real_stations_agree_once_the_systematic_part_is_known(data
     assert result.exit_code == 0, result.output
     told = json.loads(output.read_text())
     assert 0.93 <= told["systematic"]["walls"]["value"] <= 0.98
-    assert 0.93 <= told["consistent"]["walls"]["value"] <= told["systematic"]["walls"]["value"]
+    assert 0.8 <= told["consistent"]["walls"]["value"] < 0.93
     assert told["systematic"]["differences"] > 500
     assert len(told["systematic"]["pairs"]) == 11
     assert all(0 <= part < 0.002 for part in told["systematic"]["systematic"])

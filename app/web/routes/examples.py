@@ -190,6 +190,7 @@ SESSION = {
     "started": 1795255000.0,
     "ended": None,
     "landmarks": 27,
+    "walls": 0,
 }
 SUGGESTION = {"mask": [{"first": 2.93, "last": -3.07, "reach": 0.31}]}
 SETTINGS_PATCH = {"extraction": {"fitter": "wctls", "min_points": 8}, "view": {"compare": True}}

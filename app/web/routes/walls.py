@@ -21,13 +21,13 @@ from lidarcore.landmarks import Box, Circle
 from lidarcore.mapping import MapPicture
 from lidarcore.mapping.export import MAP_FILES, walls_csv, walls_geojson, write_map
 from lidarcore.mapping.grid import OccupancyGrid, shades_of
-from lidarcore.mapping.walls import Walls, along, distances, in_box, nearest
+from lidarcore.mapping.walls import Walls, WallTable, along, distances, in_box, nearest
 
 from ...errors import NotFoundError
 from ...pipeline.runtime import Runtime
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite, Matrix, Pair
-from .dependencies import CurrentRuntime, Heavy
+from .dependencies import CurrentLandmarks, CurrentRuntime, Heavy
 from .examples import MEDIA_TYPES, ok
 from .landmarks import Metres, Region
 
@@ -88,21 +88,32 @@ async def _wanted(
         float | None, Query(ge=-7, le=7, description="rad from the x axis; a wall runs both ways")
     ] = None,
     tolerance: Annotated[float, Query(ge=0, le=1.6, description="rad that the direction may be off")] = 0.1,
-) -> Callable[[Walls], Mask]:
+) -> Callable[[WallTable], Mask]:
     """Which walls count. Raises ProblemError 422 if the lengths are exchanged."""
     if min_length > max_length:
         raise ProblemError(
             422, f"min_length is {min_length:g} m, above max_length, {max_length:g} m: exchange them."
         )
 
-    def which(walls: Walls) -> Mask:
+    def which(walls: WallTable) -> Mask:
         kept: Mask = (walls.length >= min_length) & (walls.length <= max_length)
         return kept if direction is None else kept & along(walls, direction, tolerance)
 
     return which
 
 
-Which = Annotated[Callable[[Walls], Mask], Depends(_wanted)]
+def _asked(
+    runtime: CurrentRuntime,
+    landmarks: CurrentLandmarks,
+    session: Annotated[
+        int | None, Query(description="of a map that is kept; if not given of the one that SLAM makes now")
+    ] = None,
+) -> WallTable:
+    return _walls(runtime) if session is None else landmarks.walls(session)
+
+
+Asked = Annotated[WallTable, Depends(_asked)]
+Which = Annotated[Callable[[WallTable], Mask], Depends(_wanted)]
 
 
 @router.get(
@@ -111,7 +122,7 @@ Which = Annotated[Callable[[Walls], Mask], Depends(_wanted)]
     responses=ok({"walls": [WALL]}, "The walls", csv=CSV, geojson={"type": "FeatureCollection"}),
 )
 def walls(
-    runtime: CurrentRuntime,
+    asked: Asked,
     region: Region,
     which: Which,
     format: Annotated[
@@ -120,13 +131,12 @@ def walls(
 ) -> Response:
     """The walls of the map that SLAM makes of whole scans, all or those asked for. 404 if it makes none.
 
-    A wall is in a box or circle if any part of it is.
+    A wall is in a box or circle if any part of it is. Kept with a session are those that three keyframes saw or more.
     """
-    found = _walls(runtime)
-    chosen = np.flatnonzero(which(found) & _within(found, region)).tolist()
+    chosen = np.flatnonzero(which(asked) & _within(asked, region)).tolist()
     if format == "json":
-        return encode({"walls": _rows(found, chosen)})
-    text = walls_csv(found, chosen) if format == "csv" else walls_geojson(found, chosen)
+        return encode({"walls": _rows(asked, chosen)})
+    text = walls_csv(asked, chosen) if format == "csv" else walls_geojson(asked, chosen)
     return Response(text, media_type=MEDIA_TYPES[format])
 
 
@@ -136,17 +146,16 @@ def walls(
     responses=ok({"walls": [WALL], "distances": [0.412]}, "The nearest first"),
 )
 def nearest_walls(
-    runtime: CurrentRuntime,
+    asked: Asked,
     which: Which,
     x: Annotated[Metres, Query(description="m", examples=[1.0])],
     y: Annotated[Metres, Query(description="m", examples=[0.5])],
     k: Annotated[int, Query(ge=1, le=10_000, description="how many")] = 1,
 ) -> Response:
     """The k walls nearest to a point, and how far from it they are between their ends. 404 if there is no map."""
-    found = _walls(runtime)
-    wanted, far = which(found), distances(found, (x, y))
-    chosen = [i for i in nearest(found, (x, y), len(found)).tolist() if wanted[i]][:k]
-    return encode({"walls": _rows(found, chosen), "distances": far[chosen].tolist()})
+    wanted, far = which(asked), distances(asked, (x, y))
+    chosen = [i for i in nearest(asked, (x, y), len(asked)).tolist() if wanted[i]][:k]
+    return encode({"walls": _rows(asked, chosen), "distances": far[chosen].tolist()})
 
 
 @router.get(
@@ -199,7 +208,7 @@ def _walls(runtime: Runtime) -> Walls:
     return found
 
 
-def _within(walls: Walls, region: Box | Circle | None) -> Mask:
+def _within(walls: WallTable, region: Box | Circle | None) -> Mask:
     if region is None:
         return np.ones(len(walls), bool)
     if isinstance(region, Circle):
@@ -215,7 +224,7 @@ def _picture(runtime: Runtime) -> MapPicture:
     raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
 
 
-def _rows(walls: Walls, chosen: list[int]) -> list[WallJson]:
+def _rows(walls: WallTable, chosen: list[int]) -> list[WallJson]:
     columns = {
         "id": walls.ids.tolist(),
         "alpha": walls.alpha.tolist(),

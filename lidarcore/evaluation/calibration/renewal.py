@@ -23,31 +23,40 @@ _STEPS = np.linspace(0.0, 1.0, 21)
 
 
 def renewal(scans: list[Scan], noise: SensorNoise) -> float:
-    """The least share (0 to 1) with which 95 % ellipses hold as much of how walls scatter in these scans.
+    """The share (0 to 1) that the median wall needs for its 95 % ellipses to hold as much of how it scatters.
 
     What beams between others find of the same wall is known (`resampling`). But where walls begin and end changes, and
-    what little moves: that shows in how the lines of walls scatter, and nowhere else.
+    what little moves: that shows in how the lines of walls scatter, and nowhere else. Walls that fall apart in every
+    other scan need far more than the rest; they do not make the ellipses of all others larger.
     """
     if noise.unevenness == 0:
         return 1.0
-    errors, repeated, anew = [], [], []
+    needed, sightings = [], []
     for begin in range(_SETTLING if len(scans) > 4 * _SETTLING else 0, len(scans), _WINDOW):
         window = scans[begin : begin + _WINDOW]
         least, most = (_sightings(window, noise, share) for share in (0.0, 1.0))
         for wall, first in least.items():
             if len(first) >= _LEAST and len(most[wall]) == len(first):
-                line = first[:, :2]
-                errors.append((line - line.mean(0)) / np.sqrt(1 - 1 / len(line)))
-                repeated.append(first[:, 2:].reshape(-1, 2, 2))
-                anew.append(most[wall][:, 2:].reshape(-1, 2, 2))
-    if not errors:
-        return 1.0
-    e, c0, c1 = np.concatenate(errors), np.concatenate(repeated), np.concatenate(anew)
+                needed.append(_needed(first, most[wall]))
+                sightings.append(len(first))
+    return _weighted_median(np.array(needed), np.array(sightings)) if needed else 1.0
+
+
+def _needed(repeated: Array, anew: Array) -> float:
+    """The least share at which the ellipses of one wall (N, 6) hold 95 % of its scatter."""
+    errors = (repeated[:, :2] - repeated[:, :2].mean(0)) / np.sqrt(1 - 1 / len(repeated))
+    c0, c1 = (rows[:, 2:].reshape(-1, 2, 2) for rows in (repeated, anew))
     for share in _STEPS.tolist():
-        solved = np.linalg.solve(c0 + share * (c1 - c0), e[..., None])[..., 0]
-        if np.mean((e * solved).sum(1) <= _CHI2_95) >= _HELD:
+        solved = np.linalg.solve(c0 + share * (c1 - c0), errors[..., None])[..., 0]
+        if np.mean((errors * solved).sum(1) <= _CHI2_95) >= _HELD:
             return float(share)
     return 1.0
+
+
+def _weighted_median(values: Array, weights: Array) -> float:
+    order = np.argsort(values)
+    below = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(below, below[-1] / 2)])
 
 
 def resampling(scans: list[Scan]) -> float:

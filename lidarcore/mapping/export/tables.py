@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.walls import Walls, WallTable
 
 Row = dict[str, Any]
 
 
-def walls_csv(walls: Walls, chosen: Iterable[int] | None = None) -> str:
+def walls_csv(walls: WallTable, chosen: Iterable[int] | None = None) -> str:
     """A line for each wall, or each chosen one; where it may go on beyond an end, `ended` is 0, `length` the least."""
     text = io.StringIO()
     writer = csv.DictWriter(text, [*_row(None, 0)], lineterminator="\n")
@@ -22,22 +22,19 @@ def walls_csv(walls: Walls, chosen: Iterable[int] | None = None) -> str:
     return text.getvalue()
 
 
-def walls_geojson(walls: Walls, chosen: Iterable[int] | None = None) -> str:
-    """Walls as LineStrings and corners as Points in the map's own metres, not degrees; the chosen ones if any are."""
+def walls_geojson(walls: WallTable, chosen: Iterable[int] | None = None) -> str:
+    """Walls as LineStrings, known corners as Points, in the map's own metres, not degrees; the chosen ones, if any."""
     kept = dict.fromkeys(range(len(walls)) if chosen is None else chosen)
     features = [_wall_feature(walls, i) for i in kept]
-    corners = walls.corners
-    features += [
-        _corner_feature(walls, k)
-        for k in range(len(corners))
-        if set(corners.walls[k].tolist()) <= kept.keys()
-    ]
+    if isinstance(walls, Walls):
+        corners = walls.corners.walls.tolist()
+        features += [_corner_feature(walls, k) for k, pair in enumerate(corners) if set(pair) <= kept.keys()]
     head = {"type": "FeatureCollection", "format": "lidarcore walls", "version": 1, "unit": "m"}
     lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
     return f'{json.dumps(head)[:-1]}, "features": [\n{lines}\n]}}\n'
 
 
-def _row(walls: Walls | None, i: int) -> Row:
+def _row(walls: WallTable | None, i: int) -> Row:
     """What a file says of a wall; the names alone without walls."""
     names = (
         "id", "alpha_rad", "r_m", "x1_m", "y1_m", "x2_m", "y2_m", "length_m", "var_alpha_rad2", "cov_alpha_r_rad_m",
@@ -60,7 +57,7 @@ def _row(walls: Walls | None, i: int) -> Row:
     )
 
 
-def _wall_feature(walls: Walls, i: int) -> Row:
+def _wall_feature(walls: WallTable, i: int) -> Row:
     row = _row(walls, i)
     first, second = (row.pop("x1_m"), row.pop("y1_m")), (row.pop("x2_m"), row.pop("y2_m"))
     return _feature(f"wall-{row.pop('id')}", "LineString", [list(first), list(second)], row)

@@ -4,6 +4,7 @@ from lidarcore.mapping.walls.identity import WallIds
 from lidarcore.mapping.walls.query import along, distances, in_box, nearest
 from lidarcore.mapping.walls.settings import WallSettings
 from lidarcore.mapping.walls.spread import Spread, common_spread, joint_spread
+from lidarcore.mapping.walls.table import WallTable
 from lidarcore.mapping.walls.walls import WallCorners, Walls, find_walls
 
 __all__ = [
@@ -11,6 +12,7 @@ __all__ = [
     "WallCorners",
     "WallIds",
     "WallSettings",
+    "WallTable",
     "Walls",
     "along",
     "common_spread",

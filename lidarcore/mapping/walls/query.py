@@ -6,10 +6,10 @@ from numpy.typing import ArrayLike
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import wrap
 from lidarcore.mapping.grid.occupancy import Mask
-from lidarcore.mapping.walls.walls import Walls
+from lidarcore.mapping.walls.table import WallTable
 
 
-def distances(walls: Walls, point: ArrayLike) -> Array:
+def distances(walls: WallTable, point: ArrayLike) -> Array:
     """Distance (W,) m of each wall from a point (2,): to its line between the ends, else to the nearer end."""
     a, along, length = _segments(walls)
     to_point = np.asarray(point, np.float64) - a
@@ -18,13 +18,13 @@ def distances(walls: Walls, point: ArrayLike) -> Array:
     return nearest
 
 
-def nearest(walls: Walls, point: ArrayLike, number: int) -> Ints:
+def nearest(walls: WallTable, point: ArrayLike, number: int) -> Ints:
     """Indices of the walls nearest to a point (2,), the nearest first; so many, or all there are."""
     order: Ints = np.argsort(distances(walls, point), kind="stable")[:number]
     return order
 
 
-def in_box(walls: Walls, low: ArrayLike, high: ArrayLike) -> Mask:
+def in_box(walls: WallTable, low: ArrayLike, high: ArrayLike) -> Mask:
     """Which walls (W,) lie at least in part in the rectangle between two corners (2,), its edges included.
 
     A segment enters a rectangle last where it enters its later slab, and leaves it first where it leaves its earlier.
@@ -40,14 +40,14 @@ def in_box(walls: Walls, low: ArrayLike, high: ArrayLike) -> Mask:
     return inside
 
 
-def along(walls: Walls, direction: float, tolerance: float) -> Mask:
+def along(walls: WallTable, direction: float, tolerance: float) -> Mask:
     """Which walls (W,) run in a direction, rad from the x axis, either way, to within a tolerance (rad)."""
     off = np.abs(wrap(2 * (walls.alpha + np.pi / 2 - direction))) / 2
     parallel: Mask = off <= tolerance
     return parallel
 
 
-def _segments(walls: Walls) -> tuple[Array, Array, Array]:
+def _segments(walls: WallTable) -> tuple[Array, Array, Array]:
     """First ends (W, 2), unit directions (W, 2) and lengths (W,); a wall without length has no direction."""
     a, step = walls.ends[:, 0], walls.ends[:, 1] - walls.ends[:, 0]
     length = np.hypot(*step.T)

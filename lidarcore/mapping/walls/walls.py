@@ -8,7 +8,7 @@ from scipy.sparse import csr_array, vstack
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import wrap
-from lidarcore.mapping.grid.occupancy import Mask, OccupancyGrid
+from lidarcore.mapping.grid.occupancy import OccupancyGrid
 from lidarcore.mapping.walls.ends import find_end
 from lidarcore.mapping.walls.grouping import group_pieces
 from lidarcore.mapping.walls.meetings import Meetings, find_meetings
@@ -18,6 +18,7 @@ from lidarcore.mapping.walls.pieces import collect_pieces
 from lidarcore.mapping.walls.settings import WallSettings
 from lidarcore.mapping.walls.sightings import Sightings
 from lidarcore.mapping.walls.spread import Spread, common_spread
+from lidarcore.mapping.walls.table import WallTable
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
@@ -46,46 +47,19 @@ class WallCorners:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Walls:
-    """W walls in the world, each a surface seen from one side: x cos(alpha) + y sin(alpha) = r.
+class Walls(WallTable):
+    """The walls of a map, and what they have in common.
 
-    ids              (W,) which is which; those of a map that grows stay, see `WallIds`
-    alpha            (W,) rad, in (-pi, pi]
-    r                (W,) m, >= 0
-    line_covariance  (W, 2, 2) of (alpha, r)
-    ends             (W, 2, 2) m; who looks from the first to the second has the free side on the left
-    end_covariance   (W, 4, 4) of both ends, x and y; along the wall it means nothing where `ended` is false
-    ended            (W, 2) false where the wall may go on, for nobody looked past it
-    in_corner        (W, 2) true where an end is a corner
-    length           (W,) m
-    length_variance  (W,) m²
-    first_seen       (W,) s
-    last_seen        (W,) s
-    count            (W,) number of keyframes that saw it
-    corners          where walls meet
-    model            what the covariances come from, for what walls have in common
-    sightings        what of which segments each wall was seen by
+    end_covariance  (W, 4, 4) of both ends, x and y; along the wall it means nothing where `ended` is false
+    corners         where walls meet
+    model           what the covariances come from, for what walls have in common
+    sightings       what of which segments each wall was seen by
     """
 
-    ids: Ints
-    alpha: Array
-    r: Array
-    line_covariance: Array
-    ends: Array
     end_covariance: Array
-    ended: Mask
-    in_corner: Mask
-    length: Array
-    length_variance: Array
-    first_seen: Array
-    last_seen: Array
-    count: Ints
     corners: WallCorners
     model: WallModel = field(repr=False)
     sightings: Sightings = field(repr=False)
-
-    def __len__(self) -> int:
-        return len(self.alpha)
 
     def __repr__(self) -> str:
         return f"Walls({len(self)} walls, {self.length.sum():.1f} m, {len(self.corners)} corners)"
@@ -128,7 +102,6 @@ def find_walls(
         r,
         covariances[:, :2, :2],
         xy,
-        covariances[:, 2:, 2:],
         ended | in_corner,
         in_corner,
         length,
@@ -136,6 +109,7 @@ def find_walls(
         np.array([stamps[k].min() for k in seen]),
         np.array([stamps[k].max() for k in seen]),
         np.array([len(k) for k in seen], np.int64),
+        covariances[:, 2:, 2:],
         _corners(parts, meetings, model),
         model,
         Sightings.of(pieces, parts),

@@ -10,9 +10,6 @@ from pydantic.dataclasses import dataclass
 
 from lidarcore.noise import SensorNoise
 
-_RENEWAL = 0.15
-"""Of the unevenness: beams fall so densely, 2 to 5 cm apart, that the next revolution meets most of it again. Measured
-without people in the room: half of the scatter is in the 50 % ellipses at 0.1 to 0.2."""
 FIRST_LINE = "RPLIDAR S1 emulated on "  # and the port: what the emulator prints when it is there
 
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -85,7 +82,8 @@ class EmulatorOptions:
             range_growth=self.range_growth,
             unevenness=self.unevenness,
             unevenness_length=self.unevenness_length,
-            renewal=_RENEWAL,
+            renewal=0.0,
+            resampling=1.0,
         )
 
     def arguments(self) -> list[str]:

@@ -1,0 +1,144 @@
+"""Walls of maps in the file of maps: kept, told again, and still there after the server was killed."""
+
+import math
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import astuple, replace
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+from lidarcore_app.jobs.landmark_store import LandmarkStore
+from lidarcore_app.jobs.wall_writer import CONFIRMED, from_stored, to_stored
+from processes import Serving
+from serving import write_room
+from waiting import wait_until
+
+from lidarcore.errors import LandmarkMapError, UnknownSessionError
+from lidarcore.landmarks import Atlas, StoredWall
+from lidarcore.mapping.walls import WallTable
+
+ROBOT = {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}}
+WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
+
+
+def stored(id: int, x: float = 0.0, count: int = 5) -> StoredWall:
+    return StoredWall(
+        id, 0.0, x, 1e-6, 1e-7, 1e-5, x, -1.0, x, 1.0, 2.0, 1e-4, 1, 0, 0, 1, 10.0 + id, 20.5, count
+    )
+
+
+def walls(*rows: StoredWall) -> WallTable:
+    return from_stored(rows)
+
+
+def test_walls_are_read_as_they_were_stored_each_session_its_own(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    first = [
+        replace(stored(id), alpha=rng.normal(), r=rng.random(), x1=rng.normal(), var_r=rng.random())
+        for id in (0, 7, 40)
+    ]
+    with Atlas(tmp_path / "maps.db") as atlas:
+        one, other = atlas.begin("one", 1.0), atlas.begin("other", 2.0)
+        one.put_walls([stored(3)])
+        one.put_walls(first)  # in place of what was there
+        other.put_walls([stored(0, 5.0)])
+    with Atlas(tmp_path / "maps.db") as atlas:
+        assert atlas[1].walls() == first
+        assert atlas[2].walls() == [stored(0, 5.0)]
+        assert [session.walls for session in atlas.sessions()] == [3, 1]
+        assert to_stored(from_stored(first)) == first
+        gone = atlas[1]
+        atlas.delete(1)
+        assert [session.walls for session in atlas.sessions()] == [1]
+        assert gone.walls() == []
+        with pytest.raises(UnknownSessionError):
+            gone.put_walls(first)
+        assert atlas[2].walls() == [stored(0, 5.0)]
+
+
+def test_walls_that_make_no_sense_leave_those_that_were_there(tmp_path: Path) -> None:
+    with Atlas(tmp_path / "maps.db") as atlas:
+        kept = atlas.begin("one", 1.0)
+        kept.put_walls([stored(0), stored(1)])
+        for wrong in (
+            [stored(5), replace(stored(6), r=math.nan)],  # nothing is stored of NaN
+            [stored(5), stored(5)],  # twice the same id
+        ):
+            with pytest.raises(LandmarkMapError):
+                kept.put_walls(wrong)
+            assert kept.walls() == [stored(0), stored(1)]
+
+
+def test_a_run_keeps_its_confirmed_walls_and_says_when_it_has_ended(tmp_path: Path) -> None:
+    with closing(LandmarkStore(tmp_path / "maps.db")) as store:
+        run = store.begin_walls("room.mcap")
+        run.put(walls(stored(0, count=CONFIRMED - 1)))
+        wait_until(lambda: store.status.behind_s == 0)
+        assert store.atlas.sessions() == []
+        run.put(walls(stored(0), stored(1, count=CONFIRMED - 1), stored(2, count=CONFIRMED)))
+        wait_until(lambda: run.session is not None and store.status.behind_s == 0)
+        assert [wall.id for wall in store.atlas[run.session].walls()] == [0, 2]
+        assert store.writes(run.session)
+        assert store.newest() is None  # of landmarks
+        store.use(None)
+        run.put(walls(stored(0), stored(2), stored(3)))  # found while the run ended
+        wait_until(lambda: len(store.walls(run.session)) == 3 and store.status.behind_s == 0)
+        (session,) = store.atlas.sessions()
+        assert (session.source, session.mode, session.walls) == ("room.mcap", "slam", 3)
+        assert session.ended is not None
+
+
+def test_a_map_that_is_deleted_while_it_grows_begins_again(tmp_path: Path) -> None:
+    with closing(LandmarkStore(tmp_path / "maps.db")) as store:
+        run = store.begin_walls("room.mcap")
+        run.put(walls(stored(0)))
+        wait_until(lambda: run.session == 1 and store.status.behind_s == 0)
+        store.atlas.delete(1)
+        run.put(walls(stored(0), stored(1)))
+        wait_until(lambda: run.session == 2 and store.status.behind_s == 0)
+        assert [astuple(wall)[0] for wall in store.atlas[2].walls()] == [0, 1]
+
+
+def test_what_a_server_told_of_its_walls_is_there_after_it_was_killed(
+    serving: Callable[..., Serving], tmp_path: Path
+) -> None:
+    room, path = write_room(tmp_path / "room.npz"), tmp_path / "maps.db"
+    server = serving(room, "--map", path)
+    with httpx.Client(base_url=f"{server.url}api/v1", timeout=60) as http:
+
+        def told(**asked: Any) -> list[dict[str, Any]]:
+            answer = http.get("/walls", params=asked)
+            return answer.json()["walls"] if answer.is_success else []
+
+        def confirmed() -> list[dict[str, Any]]:
+            rows = [wall for wall in told() if wall["count"] >= CONFIRMED]
+            return sorted(rows, key=lambda wall: wall["id"])
+
+        http.put("/source", json=ROBOT).raise_for_status()
+        http.patch("/settings", json=WHOLE_SCANS).raise_for_status()
+        wait_until(lambda: len(confirmed()) >= 4, seconds=120)
+        http.patch("/source", json={"state": "paused"}).raise_for_status()
+        wait_until(lambda: len(before := confirmed()) >= 4 and told(session=1) == before, seconds=60)
+        before = told(session=1)
+        table = http.get("/walls", params={"session": 1, "format": "csv"}).text
+    server.process.kill()
+    server.process.wait()
+
+    again = serving(room, "--map", path)
+    with httpx.Client(base_url=f"{again.url}api/v1", timeout=60) as http:
+        assert http.get("/walls").status_code == 404  # nothing is mapped now
+        assert http.get("/walls", params={"session": 1}).json()["walls"] == before
+        assert http.get("/walls", params={"session": 1, "format": "csv"}).text == table
+        features = http.get("/walls", params={"session": 1, "format": "geojson"}).json()["features"]
+        assert [one["id"] for one in features] == [f"wall-{wall['id']}" for wall in before]
+        x, y = np.mean([before[0]["start"], before[0]["end"]], axis=0)
+        near = http.get("/walls/nearest", params={"session": 1, "x": x, "y": y}).json()
+        assert near["walls"] == before[:1]
+        assert http.get("/walls", params={"session": 2}).status_code == 404
+        (session,) = http.get("/sessions").json()["sessions"]
+        assert (session["walls"], session["landmarks"], session["ended"]) == (len(before), 0, None)
+        http.delete("/sessions/1").raise_for_status()
+        assert http.get("/walls", params={"session": 1}).status_code == 404
