@@ -15,12 +15,13 @@ class Worker(Generic[Item]):
     """
 
     def __init__(self, job: Callable[[Item | None, int], None], name: str, idle: float | None = None) -> None:
-        self._job, self._idle = job, idle
+        self._idle = idle
         self._queue: deque[Item] = deque()
         self._filled = threading.Condition()
         self._closing = self._busy = False
         self._failure: BaseException | None = None
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+        # The job may hold the worker: only the thread holds the job, so that both are freed as soon as it has ended.
+        self._thread = threading.Thread(target=self._run, args=(job,), name=name, daemon=True)
         self._thread.start()
 
     @property
@@ -56,16 +57,16 @@ class Worker(Generic[Item]):
         if self._failure is not None:
             raise self._failure
 
-    def _run(self) -> None:
+    def _run(self, job: Callable[[Item | None, int], None]) -> None:
         try:
-            while self._next():
+            while self._next(job):
                 pass
         except BaseException as failure:  # told to whoever brings the next item
             with self._filled:
                 self._failure = failure
                 self._filled.notify_all()
 
-    def _next(self) -> bool:
+    def _next(self, job: Callable[[Item | None, int], None]) -> bool:
         with self._filled:
             self._busy = False
             self._filled.notify_all()
@@ -75,5 +76,5 @@ class Worker(Generic[Item]):
             self._busy = True
             item = self._queue.popleft() if self._queue else None
             waiting = len(self._queue)
-        self._job(item, waiting)
+        job(item, waiting)
         return True

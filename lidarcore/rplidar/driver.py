@@ -217,6 +217,8 @@ class Driver:
             self._session.close()
             self._revolutions.close()
             self._become("closed", None if self._failure is None else str(self._failure))
+            # Who is told may hold the driver: without a cycle both are freed as soon as nobody needs them.
+            self._tap = self._on_change = None
 
     def _follow(self) -> None:
         """Hand on revolutions until the sensor is lost."""

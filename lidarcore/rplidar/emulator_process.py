@@ -31,7 +31,6 @@ class EmulatorProcess:
         chosen = EmulatorOptions(**options)
         self.noise = chosen.noise
         self._owns_folder = chosen.link is None
-        self._on_end = on_end
         self._closing = threading.Event()
         # A session of its own: what a terminal interrupts is this process, which then ends the emulator.
         self._process = subprocess.Popen(
@@ -44,7 +43,7 @@ class EmulatorProcess:
         )
         self._speaking = threading.Lock()  # each question gets its own answer
         self._lines: queue.Queue[str] = queue.Queue()
-        self._reader = threading.Thread(target=self._read, name="emulator", daemon=True)
+        self._reader = threading.Thread(target=self._read, args=(on_end,), name="emulator", daemon=True)
         self._reader.start()
         self.port = self._first_line().removeprefix(FIRST_LINE)
 
@@ -112,7 +111,7 @@ class EmulatorProcess:
             )
         return line.rstrip("\n")
 
-    def _read(self) -> None:
+    def _read(self, on_end: Callable[[], None] | None) -> None:
         """Lines as they come, and an empty one at the end; then see to what the process has left behind."""
         assert self._process.stdout is not None
         first = self._process.stdout.readline()
@@ -123,8 +122,8 @@ class EmulatorProcess:
         if killed and first.startswith(FIRST_LINE):
             self._clear_up(Path(first.removeprefix(FIRST_LINE).rstrip("\n")))
         self._lines.put("")
-        if first and self._on_end and not self._closing.is_set():
-            self._on_end()
+        if first and on_end and not self._closing.is_set():
+            on_end()
 
     def _clear_up(self, link: Path) -> None:
         """Remove the port, which may soon lead to another's terminal."""

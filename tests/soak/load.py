@@ -99,7 +99,7 @@ class Load:
             await asyncio.sleep(10)
             # Unplugged at this moment it is not there: then again, until it is.
             while not await self._ask(
-                "PUT", "source", 200, 422, 503, json={"kind": "device", "port": self._sensor.port}
+                "PUT", "source", 200, 404, 503, json={"kind": "device", "port": self._sensor.port}
             ):
                 await asyncio.sleep(2)
 

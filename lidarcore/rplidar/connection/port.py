@@ -113,12 +113,13 @@ class Port:
         """Let go of the port, also of a dead one."""
         with self._writing:
             self._serial.close()
+        self._tap = None
 
     def _tell(self, direction: Literal["in", "out"], data: bytes) -> None:
         """What the tap raises is kept for the next read(): it must not prevent the motor from being stopped."""
-        if self._tap:
+        if tap := self._tap:
             try:
-                self._tap(direction, time.time(), data)
+                tap(direction, time.time(), data)
             except Exception as error:
                 self._tap, self._tap_failure = None, error
 
