@@ -53,7 +53,7 @@ class BackEnd:
 
     def add(self, tracked: Tracked, search: bool = True) -> None:
         """Append a keyframe, and bend the map if it closes loops; search=False leaves them for later."""
-        keyframe = Keyframe(tracked.scan, tracked.patches, sight(tracked.scan))
+        keyframe = Keyframe(tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
         with self.lock:
             self._add(tracked, keyframe, search)
             self.snapshot = Snapshot(tuple(self.keyframes), self.graph.poses, tuple(self.loops))
@@ -82,7 +82,10 @@ class BackEnd:
         """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""
         self.graph.optimize()
         scans = [keyframe.patches for keyframe in self.keyframes]
-        refined = refine(scans, self.graph.poses, self.steps, self._settings.cell, self._islands.numbers)
+        sweeps = np.array([keyframe.sweep for keyframe in self.keyframes])
+        refined = refine(
+            scans, self.graph.poses, self.steps, self._settings.cell, self._islands.numbers, sweeps
+        )
         self.graph.move(refined.poses)
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
         self.snapshot = Snapshot(tuple(self.keyframes), refined.poses, tuple(self.loops))

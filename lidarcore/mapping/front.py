@@ -8,12 +8,12 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
 from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
-from lidarcore.localization.deskewing import deskew
 from lidarcore.mapping.correlative import search
 from lidarcore.mapping.laying import Laid, information_of, lay
 from lidarcore.mapping.patches import Patches, patches
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.surfels import Surfels, surfels
+from lidarcore.mapping.sweep import NOTHING, Sweep
 from lidarcore.scan import Scan
 
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
@@ -41,6 +41,7 @@ class Tracked:
     on        False if it lies on nothing known: only odometry or the last motion says where it is
     scan      as a sensor would see it that stood still at its stamp
     patches   of the scan
+    sweep     (3, 3) how far the scan may stand from where the sensor was at its stamp, a part of tie's covariance
     keyframe  whether the scan is one
     island    True if it lies on nothing known, or fits in several places, and its heading is vague: how it, and what
               follows, lies to what was before is open
@@ -53,6 +54,7 @@ class Tracked:
     on: bool
     scan: Scan
     patches: Patches
+    sweep: Array
     keyframe: bool
     island: bool
 
@@ -68,26 +70,35 @@ class FrontEnd:
         self._anchor = np.zeros(3)  # T_local_keyframe
         self._known = self._moved = _HERE  # T_keyframe_scan, and by motion alone
         self._before: tuple[float, Array | None] | None = None  # stamp and odometry
+        self._sweep = Sweep()
         self._motion, self._period = np.zeros(3), 0.0  # s between scans, as stamps of single scans jitter
 
-    def step(self, scan: Scan) -> Tracked:
-        """Place a scan. Raises MotionError if the clock went back or odometry jumped; nothing has changed then."""
+    def step(self, scan: Scan, removed: Array | None = None) -> Tracked:
+        """Place a scan; removed (3,) m/s, m/s, rad/s is the motion that was taken out of it already.
+
+        Raises MotionError if the clock went back or odometry jumped; nothing has changed then.
+        """
         if self._before is None:
             seen = patches(scan, self._settings.match)
             self._before = scan.stamp, scan.odometry
             self._begin(seen)
-            return Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, True, False)
+            return Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, NOTHING, True, False)
         dt, driven = self._since(scan)
-        if (
-            scan.odometry is not None
-        ):  # without, the motion found depends on what is taken out, and may run away
-            scan = _deskewed(scan, driven.pose, dt)
-        seen = patches(scan, self._settings.match)
         guess, moved = self._known.compose(driven), self._moved.compose(driven)
+        wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
+        scan = self._sweep.remove(scan, wheels, removed)
+        seen = patches(scan, self._settings.match)
         laid = self._laid(seen, guess)
+        if laid.inliers >= _SURE and dt > 0:
+            found = relative(self._known.pose, self._tie(laid).pose) / dt
+            corrected = self._sweep.correct(scan, found, dt)
+            if corrected is not scan:
+                scan, seen = corrected, patches(corrected, self._settings.match)
+                laid = self._laid_again(seen, guess, laid.pose)
         rival = self._rival(seen, guess, laid)
         on = laid.inliers >= self._settings.inliers and rival is None
         tie = self._tie(laid) if on else guess
+        tie = UncertainPose(tie.pose, tie.covariance + self._sweep.covariance)
         if rival is not None:
             tie = self._either(laid, rival)
         island = len(seen.means) >= _BLIND and not on and bool(tie.covariance[2, 2] > VAGUE**2)
@@ -95,7 +106,9 @@ class FrontEnd:
         self._period += _SLOW * (dt - self._period)
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
         leaves = island or (len(seen.means) >= _BLIND and self._leaves(tie[0], laid.inliers))
-        tracked = Tracked(scan.stamp, self._number - 1, tie, moved, on, scan, seen, leaves, island)
+        tracked = Tracked(
+            scan.stamp, self._number - 1, tie, moved, on, scan, seen, self._sweep.covariance, leaves, island
+        )  # fmt: skip
         if leaves:
             self._anchor = compose(self._anchor, tie[0])
             if island:
@@ -143,6 +156,12 @@ class FrontEnd:
             laid = self._searched(seen, x, _FURTHER * sigma, prior, laid)
         return laid
 
+    def _laid_again(self, seen: Patches, guess: UncertainPose, pose: Array) -> Laid:
+        """The scan on the local map, from a pose near the right one."""
+        assert self._map is not None
+        x, P = UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        return lay(self._map, seen, pose, x, information_of(P), self._settings.match.reach)
+
     def _searched(self, seen: Patches, x: Array, sigma: Array, prior: Array, laid: Laid) -> Laid:
         """The better one of where the scan was laid and where a search finds it."""
         assert self._map is not None
@@ -187,11 +206,3 @@ class FrontEnd:
         s = self._settings
         far = np.hypot(*pose[:2]) >= s.keyframe_distance or abs(pose[2]) >= s.keyframe_turn
         return bool(far or inliers < _BAD)
-
-
-def _deskewed(scan: Scan, motion: Array, dt: float) -> Scan:
-    """The scan without what a motion (3,) in dt s did to it; as it is if beams have no times."""
-    if dt <= 0 or scan.beam_times is None or not np.isfinite(scan.beam_times).all():
-        return scan
-    v, u, w = motion / dt
-    return deskew(scan, float(v), float(w), float(u))

@@ -13,11 +13,15 @@ from lidarcore.scan import Scan
 
 
 class Keyframe(NamedTuple):
-    """A scan of the map, its patches, and what it saw and looked through."""
+    """A scan of the map, its patches, and what it saw and looked through.
+
+    sweep  (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
+    """
 
     scan: Scan
     patches: Patches
     sight: Sight
+    sweep: Array
 
 
 class Keyframes(NamedTuple):

@@ -13,7 +13,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import UncertainPose, pose_difference, relative, relative_jacobians, wrap
+from lidarcore.geometry import UncertainPose, pose_difference, relative, relative_jacobians, rotation, wrap
 from lidarcore.mapping.adjustment import Sightings, Sums, normal_equations
 from lidarcore.mapping.patches import Patches
 
@@ -36,11 +36,13 @@ class Step:
 class Refined:
     """Poses (K, 3) with their joint covariance; and what was measured of the surfaces.
 
+    sweeps      (K, 3, 3) covariance that each pose has besides, seen from itself: of where its scan stands
     scale       times the patches' own variances, which noise really has
     unevenness  m, standard deviation that all patches of one view of one place share
     """
 
     poses: Array
+    sweeps: Array
     scale: float
     unevenness: float
     _factor: SuperLU
@@ -48,15 +50,21 @@ class Refined:
 
     def covariance(self, i: int) -> Array:
         """Covariance (3, 3) of pose i, given the first."""
-        block = self._block(i, i)
+        block = self._own(i)
         return (block + block.T) / 2
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j with its covariance."""
         A, B = relative_jacobians(self.poses[i], self.poses[j])
         mixed = A @ self._block(i, j) @ B.T
-        P = A @ self._block(i, i) @ A.T + mixed + mixed.T + B @ self._block(j, j) @ B.T
+        P = A @ self._own(i) @ A.T + mixed + mixed.T + B @ self._own(j) @ B.T
         return UncertainPose(relative(self.poses[i], self.poses[j]), (P + P.T) / 2)
+
+    def _own(self, i: int) -> Array:
+        """That of pose i itself; the first one is where the map begins."""
+        R = np.eye(3)
+        R[:2, :2] = rotation(self.poses[i, 2])
+        return self._block(i, i) + (R @ self.sweeps[i] @ R.T if i else 0.0)
 
     def _block(self, i: int, j: int) -> Array:
         if j not in self._columns:
@@ -72,14 +80,17 @@ def refine(
     steps: list[Step],
     size: float,
     islands: Ints | None = None,
+    sweeps: Array | None = None,
     rounds: int = 12,
 ) -> Refined:
     """Adjust poses (K, 3) that are right to about a cell's `size` m; the first one stays.
 
     islands (K,) number what each pose is right to: surfaces seen from different islands are different ones.
+    sweeps (K, 3, 3) are covariances of where each scan stands beside its pose; they move nothing.
     steps tie keyframes by odometry or the going on of the motion: what is known where surfaces say nothing.
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
+    sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
     seen = _sightings(scans)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
@@ -93,7 +104,7 @@ def refine(
         if np.abs(step).max() < _SETTLED:
             break
     sums, _ = normal_equations(seen, poses, islands, size, scale, unevenness)
-    return Refined(poses, scale, unevenness, _factor(_with_steps(sums, poses, steps)[0]))
+    return Refined(poses, sweeps, scale, unevenness, _factor(_with_steps(sums, poses, steps)[0]))
 
 
 def _sightings(scans: list[Patches]) -> Sightings:

@@ -1,7 +1,6 @@
 """SLAM from whole scans: each one is laid on the last keyframes at once, and the map behind is bent meanwhile."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,11 +92,11 @@ class WholeScans:
     ) -> TrackingResult:
         """Place a scan that `deskewed` gave. After a break of clock or odometry the map begins anew."""
         try:
-            tracked, message = self._front.step(replace(scan, beam_times=None)), None
+            tracked, message = self._front.step(scan, self._removed(scan)), None
         except MotionError as error:
             self.end()
             self._begin()
-            tracked, message = self._front.step(replace(scan, beam_times=None)), goes_on(error)
+            tracked, message = self._front.step(scan, self._removed(scan)), goes_on(error)
         here = self._located(tracked)
         self._reckon(scan, here.pose)
         why = None if tracked.on else _NOT_CONNECTED
@@ -105,6 +104,11 @@ class WholeScans:
             why = _ISLAND
         state: State = "lost" if why else "tracking"
         return self._result(tracked.stamp, state, message or why, here)
+
+    def _removed(self, scan: Scan) -> Array:
+        """Velocity (3,) m/s, m/s, rad/s that `deskewed` took out of the scan."""
+        v, w, u = self._distortion.velocity if self._distortion.stamp == scan.stamp else (0.0, 0.0, 0.0)
+        return np.array([v, u, w])
 
     def end(self) -> None:
         """Take no more scans; returns at once."""

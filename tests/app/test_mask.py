@@ -1,6 +1,7 @@
 """The mask of the robot's own body, in the server and on the command line."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import httpx
@@ -68,6 +69,25 @@ def test_a_recording_plays_with_the_mask_that_it_keeps_until_another_is_set(serv
     assert server.get("/settings")["sensor"]["mask"] == []
     assert nearest(paused_at(server, 3, sensor=None)) > NEAR
     assert server.get("/settings")["sensor"]["mask"] == SECTORS
+
+
+def test_a_mask_given_at_the_start_comes_before_the_one_that_is_kept(
+    make_server: Callable[..., Server], tmp_path: Path
+) -> None:
+    write(tmp_path / "kept.mcap", MASK)
+    given = Settings().patched({"sensor": {"mask": SECTORS[:1]}})
+    for settings, mask in ((given, SECTORS[:1]), (Settings(), SECTORS)):
+        server = make_server(recording=tmp_path / "kept.mcap", settings=settings)
+        assert server.get("/settings")["sensor"]["mask"] == mask
+
+
+def test_whoever_is_told_of_frames_gets_the_scan_without_the_body(server: Server) -> None:
+    seen: list[Scan] = []
+    server.runtime.frame_listeners.append(lambda frame: seen.append(frame.timed.scan))
+    write(server.folder / "kept.mcap", MASK)
+    server.play(server.folder / "kept.mcap")
+    wait_until(lambda: seen and len(seen[-1]) == len(drive(1)[0]))
+    assert not seen[-1].valid[on_posts(seen[-1])].any()
 
 
 @pytest.mark.parametrize(

@@ -26,7 +26,9 @@ def charted(graph, keyframes, world, poses, at):
     rng = np.random.default_rng(len(keyframes))
     for seen_from, pose in zip(poses, at, strict=True):
         scan = full_scan(world, seen_from, NOISE, rng)
-        keyframes.append(Keyframe(scan, patches(scan, MatchSettings(noise=NOISE)), sight(scan)))
+        keyframes.append(
+            Keyframe(scan, patches(scan, MatchSettings(noise=NOISE)), sight(scan), np.zeros((3, 3)))
+        )
         if len(keyframes) > 1:
             node = graph.add(pose)
             graph.connect(node - 1, node, [0.3, 0, 0], VAGUE)

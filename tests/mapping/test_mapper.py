@@ -2,15 +2,18 @@
 
 import threading
 from dataclasses import replace
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 import pytest
 from mapping_scenes import SETTINGS, drive, full_scan, way
 
+from lidarcore import SensorNoise
 from lidarcore.errors import MotionError
 from lidarcore.geometry import pose_difference, relative
-from lidarcore.mapping import Mapper
+from lidarcore.mapping import Mapper, MapperSettings
+from lidarcore.simulation.robot import SimulatedRobot
+from lidarcore.simulation.settings import SimulationSettings
 
 
 def mapped(scans):
@@ -136,3 +139,29 @@ def test_what_ends_the_thread_is_told_to_whoever_brings_scans(monkeypatch):
         monkeypatch.setattr("lidarcore.mapping.back.compose", broken)
         with pytest.raises(ZeroDivisionError):
             go_on()
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_what_moves_while_a_scan_is_taken_is_as_far_off_as_it_says(odometry):
+    """Ten scans a second of a robot that turns: by its wheels alone headings were off by 8 mrad, and 15 sigma.
+
+    Speeds change, and by how much in one revolution is a guess: means of normalised errors between a third and three
+    times what they should be. The first scan is left out: nobody knows yet how the sensor moves.
+    """
+    noise = SensorNoise(0.01, 0.001)
+    robot = SimulatedRobot(SimulationSettings(world="corridor", seed=1, noise=noise))
+    scans = list(islice(robot, 250))
+    mapper = Mapper(MapperSettings().with_noise(noise))
+    for scan in scans:
+        mapper.step(scan if odometry else replace(scan, odometry=None))
+    mapper.finish()
+    true = np.array([scans[k].truth for k in mapper.keyframes.numbers])
+    assert len(true) > 30
+    off, squares = [], []
+    for k in range(1, len(true) - 1):
+        found = mapper.relative(k, k + 1)
+        off.append(pose_difference(found.pose, relative(true[k], true[k + 1])))
+        squares.append(off[-1] @ np.linalg.solve(found.covariance, off[-1]))
+    print(np.sqrt(np.mean(np.square(off), axis=0)), np.mean(squares))
+    assert np.sqrt(np.mean(np.square(off), axis=0))[2] < 0.003
+    assert 1 < np.mean(squares) < 9

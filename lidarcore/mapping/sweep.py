@@ -1,0 +1,67 @@
+"""How the sensor moved while it took a scan, by what scans say of it.
+
+A revolution takes a tenth of a second. Wheels tell a turn in it to some hundredths of a radian per second, scans laid
+on a map far better: so a scan is laid twice, the second time without the motion that the first one found.
+"""
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.localization.deskewing import deskew
+from lidarcore.scan import Scan
+
+_PAUSE = 1.0  # s between two scans, from which on their distance says nothing of the speed in the last one
+_NO_MOTION = np.zeros(3)
+NOTHING = np.zeros((3, 3))
+
+
+class Sweep:
+    """Takes the motion of the sensor out of one scan after another. Velocities (3,) are in m/s, m/s and rad/s.
+
+    covariance  (3, 3) of T_stamp_scan: how far the scan may stand from where the sensor was at its stamp, as its speed
+                in the revolution may differ from that since the scan before by as much as it did the time before
+    """
+
+    def __init__(self) -> None:
+        self.covariance = NOTHING
+        self._removed = _NO_MOTION
+        self._last: Array | None = None
+
+    def remove(self, scan: Scan, velocity: Array | None, removed: Array | None) -> Scan:
+        """The scan as a sensor that stood still would see it, if this one moved at this velocity; the same if unknown.
+
+        Nothing is taken out again where a velocity was `removed` before.
+        """
+        self.covariance = NOTHING
+        if removed is None and velocity is not None:
+            scan = _deskewed(scan, velocity)
+        self._removed = next((known for known in (removed, velocity) if known is not None), _NO_MOTION)
+        return scan
+
+    def correct(self, scan: Scan, found: Array, dt: float) -> Scan:
+        """The scan without the motion (3,) that was found since the scan before it, dt > 0 s ago; the same if unknown.
+
+        What is found depends on what was removed: if that is too much by e, the scan lies behind by e times the mean
+        time of its beams, and what is found is too little by that over dt. So the motion that would find itself is
+        sought, not the one that was found.
+        """
+        if scan.beam_times is None or not _is_swept(scan) or dt > _PAUSE:
+            self._last = None
+            return scan
+        half = float(np.mean(scan.beam_times))
+        velocity = self._removed + (found - self._removed) / (1 + half / dt)
+        changed = velocity - (self._removed if self._last is None else self._last)
+        scan = _deskewed(scan, velocity - self._removed)
+        self._removed = self._last = velocity
+        self.covariance = np.diag((half * changed) ** 2)
+        return scan
+
+
+def _is_swept(scan: Scan) -> bool:
+    """Whether its beams have times."""
+    return scan.beam_times is not None and bool(np.isfinite(scan.beam_times).all())
+
+
+def _deskewed(scan: Scan, velocity: Array) -> Scan:
+    v, u, w = velocity.tolist()
+    return deskew(scan, v, w, u) if _is_swept(scan) else scan
