@@ -18,10 +18,12 @@ run: .venv/.run
 
 test: .venv/.dev lint
 	@$(browser)
+	@$(ahead)
 	$(parallel)
 
 coverage: .venv/.dev
 	@$(browser)
+	@$(ahead)
 	$(parallel) --cov --cov-report=term:skip-covered
 
 # Whether the tests notice the seeded faults; in about half an hour.
@@ -37,6 +39,8 @@ soak: .venv/.dev
 	$(bin)/python tests/soak/run.py $(MINUTES:%=--minutes %) $(SEED:%=--seed %)
 
 parallel := $(bin)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --durations=15
+# Otherwise every process of the tests would compile the same kernels.
+ahead := $(bin)/python -m lidarcore.mapping.ahead
 browser := command -v chromium-headless-shell >/dev/null || { $(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends chromium-headless-shell fonts-dejavu-core; }
 
 lint: .venv/.dev

@@ -74,7 +74,7 @@ class _Locator(_CacheLocator):  # type: ignore[misc]
         self._function = function
 
     def get_cache_path(self) -> str:
-        return str(_folder())
+        return str(folder())
 
     def get_source_stamp(self) -> str:
         return _fingerprint(self._function)
@@ -145,7 +145,7 @@ def _described(value: Any) -> bytes:
 
 
 @cache
-def _folder() -> Path:
+def folder() -> Path:
     """Where compiled kernels are kept: beside the package, else in the user's cache, else for this process only."""
     if numba.config.CACHE_DIR:
         return Path(numba.config.CACHE_DIR)
@@ -161,6 +161,12 @@ def _folder() -> Path:
         stacklevel=2,
     )
     return Path(temporary.name)
+
+
+def is_kept() -> bool:
+    """Whether what is compiled outlives this process."""
+    folder()
+    return not _TEMPORARY
 
 
 _TEMPORARY: list[tempfile.TemporaryDirectory[str]] = []  # removed when the process ends

@@ -53,6 +53,7 @@ def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_b
     """Serve until interrupted. Raises RecordingError or TopicError if the recording cannot be played."""
     from threadpoolctl import threadpool_limits
 
+    from ..jobs.compiling import compiled_ahead
     from ..memory import share_arenas
     from .log import throttle_servers
     from .server import create_app
@@ -70,7 +71,7 @@ def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_b
     print("Stop with Ctrl-C.", flush=True)
     if open_browser:
         webbrowser.open(url)
-    with suppress(KeyboardInterrupt):
+    with compiled_ahead(), suppress(KeyboardInterrupt):
         server.run(sockets=[listening])
 
 

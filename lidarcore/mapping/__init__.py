@@ -20,6 +20,7 @@ __all__ = [
     "Placement",
     "PoseGraph",
     "WholeScans",
+    "ahead",
     "export",
     "grid",
     "measure",

@@ -54,16 +54,16 @@ def test_where_nothing_can_be_kept_it_says_so_once(tmp_path: Path, monkeypatch: 
     blocked.touch()
     monkeypatch.setattr(compiled, "_candidates", lambda: iter([blocked / "first", blocked / "second"]))
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    compiled._folder.cache_clear()
+    compiled.folder.cache_clear()
     try:
         with pytest.warns(RuntimeWarning, match="Set NUMBA_CACHE_DIR") as warned:
-            folder = compiled._folder()
+            folder = compiled.folder()
         with warnings.catch_warnings(action="error"):
-            assert compiled._folder() == folder
+            assert compiled.folder() == folder
         assert len(warned) == 1
         assert folder.is_dir()
     finally:
-        compiled._folder.cache_clear()
+        compiled.folder.cache_clear()
 
 
 def test_the_second_choice_is_taken_where_the_first_cannot_be_written(
@@ -74,8 +74,8 @@ def test_the_second_choice_is_taken_where_the_first_cannot_be_written(
         compiled, "_candidates", lambda: iter([tmp_path / "a file" / "kernels", tmp_path / "home"])
     )
     monkeypatch.setattr(numba.config, "CACHE_DIR", "")
-    compiled._folder.cache_clear()
+    compiled.folder.cache_clear()
     try:
-        assert compiled._folder() == tmp_path / "home"
+        assert compiled.folder() == tmp_path / "home"
     finally:
-        compiled._folder.cache_clear()
+        compiled.folder.cache_clear()
