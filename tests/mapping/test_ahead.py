@@ -32,4 +32,4 @@ def test_nothing_is_left_to_compile_for_a_live_map() -> None:
     done = subprocess.run([sys.executable, "-c", CHECK], capture_output=True, text=True, check=True)
     left, number = done.stdout.splitlines()
     assert left == "{}"
-    assert int(number) > 20
+    assert int(number) > 10  # from the cache only those that Python calls
