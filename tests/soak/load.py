@@ -18,7 +18,7 @@ BROWSERS = 3
 PATIENCE = 60.0  # s for an answer
 FAULTS = ("lose 0.05", "flip 0.02", "lose-bytes 0.01", "stall 1", "garbage 500", "unplug")
 READ = ("frame", "source", "recordings", "settings", "localization", "pose", "trajectory", "landmarks", "sessions",
-    "recorder", "walls", "map/grid", "map?format=zip", "devices", "clusters", "profiles", "studies")  # fmt: skip
+    "recorder", "walls", "map/grid", "map/grid?format=zip", "devices", "clusters", "profiles", "studies")  # fmt: skip
 BROKEN = (
     b"",
     b"\x00" * 100_000,
