@@ -7,18 +7,25 @@ from contextlib import contextmanager
 
 from lidarcore.mapping import ahead
 
-_END_WITHIN = 5.0  # s
-
 
 @contextmanager
 def compiled_ahead() -> Iterator[None]:
-    """Compile what the cache lacks while something else is done; what is not finished by then is left for next time."""
+    """Compile what the cache lacks while something else is done; what is not finished by then is left for next time.
+
+    It says nothing: without it everything works, later.
+    """
     if not ahead.is_missing():
         yield
         return
-    process = subprocess.Popen([sys.executable, "-m", ahead.__name__], stdout=subprocess.DEVNULL)
+    # A session of its own: Ctrl-C ends the server, which then ends this process without a traceback in between.
+    process = subprocess.Popen(
+        [sys.executable, "-m", ahead.__name__],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
     try:
         yield
     finally:
-        process.terminate()
-        process.wait(_END_WITHIN)
+        process.kill()  # a kernel that is half written is written to a name of its own first
+        process.wait()

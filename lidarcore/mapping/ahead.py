@@ -15,7 +15,7 @@ from lidarcore.mapping.walls import find_walls
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
-_SCANS = 150  # of a simulated robot: half a round, with loops
+_SCANS = 300  # of a simulated robot, which comes back to where it was: loops have kernels of their own
 _PRIORITY = 10
 
 
@@ -26,7 +26,7 @@ def is_missing() -> bool:
 
 def warm_up() -> None:
     """Compile every kernel of maps, or load it from the cache; says so in the cache."""
-    scans = list(islice(SimulatedRobot(SimulationSettings(world="furnished room")), _SCANS))
+    scans = list(islice(SimulatedRobot(SimulationSettings(world="two rooms")), _SCANS))
     mapper = Mapper(MapperSettings())
     for scan in scans:
         mapper.step(scan)

@@ -25,7 +25,8 @@ class Sweep:
     def __init__(self) -> None:
         self.covariance = NOTHING
         self._removed = _NO_MOTION
-        self._last: Array | None = None
+        self._before: Array | None = None  # velocity in the last scan, if it was found
+        self._found: Array | None = None  # in this one
 
     def remove(self, scan: Scan, velocity: Array | None, removed: Array | None) -> Scan:
         """The scan as a sensor that stood still would see it, if this one moved at this velocity; the same if unknown.
@@ -33,6 +34,7 @@ class Sweep:
         Nothing is taken out again where a velocity was `removed` before.
         """
         self.covariance = NOTHING
+        self._before, self._found = self._found, None
         if removed is None and velocity is not None:
             scan = _deskewed(scan, velocity)
         self._removed = next((known for known in (removed, velocity) if known is not None), _NO_MOTION)
@@ -46,13 +48,12 @@ class Sweep:
         sought, not the one that was found.
         """
         if scan.beam_times is None or not _is_swept(scan) or dt > _PAUSE:
-            self._last = None
             return scan
         half = float(np.mean(scan.beam_times))
         velocity = self._removed + (found - self._removed) / (1 + half / dt)
-        changed = velocity - (self._removed if self._last is None else self._last)
+        changed = velocity - (self._removed if self._before is None else self._before)
         scan = _deskewed(scan, velocity - self._removed)
-        self._removed = self._last = velocity
+        self._removed = self._found = velocity
         self.covariance = np.diag((half * changed) ** 2)
         return scan
 

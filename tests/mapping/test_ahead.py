@@ -18,7 +18,7 @@ ahead.warm_up()
 assert not ahead.is_missing()
 before = compiled()
 slam = WholeScans()
-for scan in islice(SimulatedRobot(SimulationSettings(world="two rooms", seed=2)), 100):
+for scan in islice(SimulatedRobot(SimulationSettings(world="two rooms", seed=2)), 300):
     slam.step(slam.deskewed(scan))
 slam.close()
 after = compiled()
