@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .agreement import agreement
+from .calibration_study import calibration
 from .evaluate_map import evaluate_map
 from .map_studies import relocation, walls
 from .options import RecordingPath, Seed, Set, SettingsFile, Topic, Workers, check_folder, settings_from
@@ -171,6 +172,7 @@ def repeatability(
         repeatability_tables.write(summary, output)
 
 
+evaluate.command()(calibration)
 evaluate.command()(stations)
 evaluate.command()(agreement)
 evaluate.command()(relocation)
