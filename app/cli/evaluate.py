@@ -12,6 +12,7 @@ import typer
 
 from .agreement import agreement
 from .evaluate_map import evaluate_map
+from .honesty import honesty
 from .map_studies import relocation, walls
 from .options import RecordingPath, Seed, Set, SettingsFile, Topic, Workers, check_folder, settings_from
 from .progress import ForPrograms, progress
@@ -173,6 +174,7 @@ def repeatability(
 
 evaluate.command()(stations)
 evaluate.command()(agreement)
+evaluate.command()(honesty)
 evaluate.command()(relocation)
 evaluate.command()(walls)
 
