@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .agreement import agreement
+from .calibration_study import calibration
 from .evaluate_map import evaluate_map
 from .honesty import honesty
 from .map_studies import relocation, walls
@@ -172,6 +173,7 @@ def repeatability(
         repeatability_tables.write(summary, output)
 
 
+evaluate.command()(calibration)
 evaluate.command()(stations)
 evaluate.command()(agreement)
 evaluate.command()(honesty)

@@ -179,9 +179,9 @@ def study(
             station = _calibrated(station, scans[:half])
         chosen = replace(settings, noise=station.noise)
         for part in _windows(scans[half:], window):
-            seen = _seen(part, chosen, methods)
-            walls.append(Figures.of(seen.walls.scatter(), kind, len(walls), len(judged)))
-            corners.append(Figures.of(seen.corners.scatter(), kind, len(corners), len(judged)))
+            found = seen(part, chosen, methods)
+            walls.append(Figures.of(found.walls.scatter(), kind, len(walls), len(judged)))
+            corners.append(Figures.of(found.corners.scatter(), kind, len(corners), len(judged)))
         judged.append(station)
         tell(len(judged))
     if not judged:
@@ -203,7 +203,8 @@ def _windows(scans: Sequence[Scan], window: int) -> list[Sequence[Scan]]:
     return [scans[i * window : (i + 1) * window] for i in range(len(scans) // window)] or [scans]
 
 
-def _seen(scans: Sequence[Scan], settings: ExtractionSettings, methods: Sequence[str]) -> Repeatability:
+def seen(scans: Sequence[Scan], settings: ExtractionSettings, methods: Sequence[str]) -> Repeatability:
+    """Walls and corners of scans from one place, by several methods."""
     found = Repeatability(max(len(scans), LEAST), methods, standing=True)
     for scan in scans:
         found.add(compare(scan, settings, methods))
