@@ -11,7 +11,7 @@ MINUTES ?=
 SEED ?=
 bin := .venv/bin
 
-.PHONY: run test coverage mutants fuzz soak lint bench page-speed demo guide docs screenshots lock clean
+.PHONY: run test test-all coverage mutants fuzz soak lint bench page-speed demo guide docs screenshots lock clean
 
 run: .venv/.run
 	$(bin)/lidarcore serve --host $(HOST) --http-port $(PORT) $(if $(RECORDING),"$(RECORDING)")
@@ -19,12 +19,19 @@ run: .venv/.run
 test: .venv/.dev lint
 	@$(browser)
 	@$(ahead)
+	$(parallel) -m "not long"
+
+# Also the tests marked `long`, each of which takes more than a few seconds; three times as long in all.
+test-all: .venv/.dev lint
+	@$(browser)
+	@$(ahead)
 	$(parallel)
 
+# Of what `make test` runs.
 coverage: .venv/.dev
 	@$(browser)
 	@$(ahead)
-	$(parallel) --cov --cov-report=term:skip-covered
+	$(parallel) -m "not long" --cov --cov-report=term:skip-covered
 
 # Whether the tests notice the seeded faults; in about half an hour.
 mutants: .venv/.dev

@@ -13,6 +13,7 @@ import typer
 from .agreement import agreement
 from .calibration_study import calibration
 from .evaluate_map import evaluate_map
+from .honesty import honesty
 from .map_studies import relocation, walls
 from .options import RecordingPath, Seed, Set, SettingsFile, Topic, Workers, check_folder, settings_from
 from .progress import ForPrograms, progress
@@ -175,6 +176,7 @@ def repeatability(
 evaluate.command()(calibration)
 evaluate.command()(stations)
 evaluate.command()(agreement)
+evaluate.command()(honesty)
 evaluate.command()(relocation)
 evaluate.command()(walls)
 

@@ -53,8 +53,10 @@ class BackEnd:
 
     def add(self, tracked: Tracked, search: bool = True) -> None:
         """Append a keyframe, and bend the map if it closes loops; search=False leaves them for later."""
-        keyframe = Keyframe(tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
+        keyframe = _keyframe(tracked)
         with self.lock:
+            if tracked.first is not None:
+                self.keyframes[0] = _keyframe(tracked.first)
             self._add(tracked, keyframe, search)
             self.snapshot = Snapshot(tuple(self.keyframes), self.graph.poses, tuple(self.loops))
 
@@ -114,6 +116,10 @@ class BackEnd:
         if loops:
             self.graph.optimize(_SETTLED)
         return len(loops)
+
+
+def _keyframe(tracked: Tracked) -> Keyframe:
+    return Keyframe(tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
 
 
 def _agrees(loop: Loop, poses: Array) -> bool:

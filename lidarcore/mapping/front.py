@@ -1,7 +1,7 @@
 """The front end: each scan is laid on the surfaces of the last keyframes, in a local frame that loops never bend."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from lidarcore.mapping.laying import Laid, information_of, lay
 from lidarcore.mapping.patches import Patches, patches
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.surfels import Surfels, surfels
-from lidarcore.mapping.sweep import NOTHING, Sweep
+from lidarcore.mapping.sweep import NOTHING, PAUSE, Sweep, is_swept, without
 from lidarcore.scan import Scan
 
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
@@ -27,6 +27,7 @@ _WIDE = 0.5  # m by which a point may be off where the search is needed in any c
 _BETTER = 0.02  # share of a scan by which a pose that was searched for must fit better than that of the guess
 _RIVAL = 0.85  # of the share of a scan on the map, from which on another pose is a rival
 _RIVALS = 3  # other poses that are looked at
+_ROUNDS = 4  # in which the motion in the first two scans is found: what is left of it halves at least
 _BAD = 0.4  # share of a scan on the map below which it is a keyframe, as it shows what is new
 
 
@@ -42,9 +43,11 @@ class Tracked:
     scan      as a sensor would see it that stood still at its stamp
     patches   of the scan
     sweep     (3, 3) how far the scan may stand from where the sensor was at its stamp, a part of tie's covariance
+    velocity  (3,) m/s, m/s, rad/s that was taken out of the scan
     keyframe  whether the scan is one
     island    True if it lies on nothing known, or fits in several places, and its heading is vague: how it, and what
               follows, lies to what was before is open
+    first     the first keyframe anew, now that the motion in it is known; told once, with the second one
     """
 
     stamp: float
@@ -55,8 +58,10 @@ class Tracked:
     scan: Scan
     patches: Patches
     sweep: Array
+    velocity: Array
     keyframe: bool
     island: bool
+    first: "Tracked | None" = None
 
 
 class FrontEnd:
@@ -70,6 +75,7 @@ class FrontEnd:
         self._anchor = np.zeros(3)  # T_local_keyframe
         self._known = self._moved = _HERE  # T_keyframe_scan, and by motion alone
         self._before: tuple[float, Array | None] | None = None  # stamp and odometry
+        self._first: Tracked | None = None  # until the second keyframe
         self._sweep = Sweep()
         self._motion, self._period = np.zeros(3), 0.0  # s between scans, as stamps of single scans jitter
 
@@ -82,8 +88,13 @@ class FrontEnd:
             seen = patches(scan, self._settings.match)
             self._before = scan.stamp, scan.odometry
             self._begin(seen)
-            return Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, NOTHING, True, False)
+            given = np.zeros(3) if removed is None else removed
+            self._first = Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, NOTHING, given, True, False)
+            return self._first
         dt, driven = self._since(scan)
+        if self._first is not None and self._before[0] == self._first.stamp:
+            self._first = self._straightened(self._first, scan, removed, driven, dt)
+            dt, driven = self._since(scan)
         guess, moved = self._known.compose(driven), self._moved.compose(driven)
         wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
         scan = self._sweep.remove(scan, wheels, removed)
@@ -107,14 +118,50 @@ class FrontEnd:
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
         leaves = island or (len(seen.means) >= _BLIND and self._leaves(tie[0], laid.inliers))
         tracked = Tracked(
-            scan.stamp, self._number - 1, tie, moved, on, scan, seen, self._sweep.covariance, leaves, island
+            scan.stamp, self._number - 1, tie, moved, on, scan, seen, self._sweep.covariance,
+            self._sweep.removed, leaves, island, self._first if leaves else None,
         )  # fmt: skip
         if leaves:
+            self._first = None
             self._anchor = compose(self._anchor, tie[0])
             if island:
                 self._window.clear()
             self._begin(seen)
         return tracked
+
+    def _straightened(
+        self, first: Tracked, scan: Scan, removed: Array | None, driven: UncertainPose, dt: float
+    ) -> Tracked:
+        """The first keyframe without the motion that the second scan shows; as it was if that does not tell.
+
+        Motion does to both scans the same, so the way between them hardly depends on what was taken out of both.
+        """
+        if not (is_swept(first.scan) and is_swept(scan) and 0 < dt <= PAUSE):
+            return first
+        given, velocity = np.zeros(3) if removed is None else removed, first.velocity
+        straight = first
+        for _ in range(_ROUNDS):
+            laid = self._laid(patches(without(scan, velocity - given), self._settings.match), driven)
+            if laid.inliers < _SURE:
+                straight = first
+                break
+            velocity = laid.pose / dt
+            bare = without(first.scan, velocity - first.velocity)
+            straight = replace(
+                first, scan=bare, patches=patches(bare, self._settings.match), velocity=velocity
+            )
+            self._begin_anew(straight.patches)
+        self._begin_anew(straight.patches)
+        if straight is not first:
+            self._motion = dt * straight.velocity
+            self._sweep.begin(straight.velocity)
+        return straight
+
+    def _begin_anew(self, seen: Patches) -> None:
+        """The first scan is another one."""
+        self._window.clear()
+        self._number = 0
+        self._begin(seen)
 
     def _begin(self, seen: Patches) -> None:
         """The scan is a keyframe: the map is made anew."""

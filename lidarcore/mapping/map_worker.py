@@ -101,7 +101,7 @@ class MapWorker:
         self._back.add(tracked)
         graph = self._back.graph
         self.corrected = Corrected(graph.poses, graph.covariance(len(graph) - 1))
-        if len(self._back.loops) > loops:
+        if len(self._back.loops) > loops or tracked.first is not None:
             self._builder.clear()
             self._drawn = 0
 

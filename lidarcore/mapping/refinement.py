@@ -49,9 +49,8 @@ class Refined:
     _columns: dict[int, Array] = field(default_factory=dict)
 
     def covariance(self, i: int) -> Array:
-        """Covariance (3, 3) of pose i, given the first."""
-        block = self._own(i)
-        return (block + block.T) / 2
+        """Covariance (3, 3) of pose i as seen from the first: where that scan stands counts in all of them."""
+        return self.relative(0, i).covariance if i else np.zeros((3, 3))
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j with its covariance."""
@@ -61,10 +60,11 @@ class Refined:
         return UncertainPose(relative(self.poses[i], self.poses[j]), (P + P.T) / 2)
 
     def _own(self, i: int) -> Array:
-        """That of pose i itself; the first one is where the map begins."""
+        """That of pose i itself."""
         R = np.eye(3)
         R[:2, :2] = rotation(self.poses[i, 2])
-        return self._block(i, i) + (R @ self.sweeps[i] @ R.T if i else 0.0)
+        block: Array = self._block(i, i) + R @ self.sweeps[i] @ R.T
+        return block
 
     def _block(self, i: int, j: int) -> Array:
         if j not in self._columns:

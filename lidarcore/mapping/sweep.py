@@ -10,7 +10,7 @@ from lidarcore.arrays import Array
 from lidarcore.localization.deskewing import deskew
 from lidarcore.scan import Scan
 
-_PAUSE = 1.0  # s between two scans, from which on their distance says nothing of the speed in the last one
+PAUSE = 1.0  # s between two scans, from which on their distance says nothing of the speed in the last one
 _NO_MOTION = np.zeros(3)
 NOTHING = np.zeros((3, 3))
 
@@ -28,15 +28,26 @@ class Sweep:
         self._before: Array | None = None  # velocity in the last scan, if it was found
         self._found: Array | None = None  # in this one
 
-    def remove(self, scan: Scan, velocity: Array | None, removed: Array | None) -> Scan:
-        """The scan as a sensor that stood still would see it, if this one moved at this velocity; the same if unknown.
+    def begin(self, velocity: Array) -> None:
+        """The first scan turned out to be taken at this velocity, which it is without."""
+        self._found = self._removed = velocity
 
-        Nothing is taken out again where a velocity was `removed` before.
+    @property
+    def removed(self) -> Array:
+        """Velocity (3,) that the last scan is without."""
+        return self._removed
+
+    def remove(self, scan: Scan, velocity: Array | None, removed: Array | None) -> Scan:
+        """The scan as a sensor that stood still would see it, if this one goes on as scans found it in the last one.
+
+        Where they did not, it is taken to move at this velocity, if one is given. Nothing is taken out again where a
+        velocity was `removed` before.
         """
         self.covariance = NOTHING
         self._before, self._found = self._found, None
+        velocity = velocity if self._before is None else self._before
         if removed is None and velocity is not None:
-            scan = _deskewed(scan, velocity)
+            scan = without(scan, velocity)
         self._removed = next((known for known in (removed, velocity) if known is not None), _NO_MOTION)
         return scan
 
@@ -47,22 +58,23 @@ class Sweep:
         time of its beams, and what is found is too little by that over dt. So the motion that would find itself is
         sought, not the one that was found.
         """
-        if scan.beam_times is None or not _is_swept(scan) or dt > _PAUSE:
+        if scan.beam_times is None or not is_swept(scan) or dt > PAUSE:
             return scan
         half = float(np.mean(scan.beam_times))
         velocity = self._removed + (found - self._removed) / (1 + half / dt)
         changed = velocity - (self._removed if self._before is None else self._before)
-        scan = _deskewed(scan, velocity - self._removed)
+        scan = without(scan, velocity - self._removed)
         self._removed = self._found = velocity
         self.covariance = np.diag((half * changed) ** 2)
         return scan
 
 
-def _is_swept(scan: Scan) -> bool:
+def is_swept(scan: Scan) -> bool:
     """Whether its beams have times."""
     return scan.beam_times is not None and bool(np.isfinite(scan.beam_times).all())
 
 
-def _deskewed(scan: Scan, velocity: Array) -> Scan:
+def without(scan: Scan, velocity: Array) -> Scan:
+    """The scan as a sensor would see it that stood still, if this one moved at a velocity (3,); the same if unknown."""
     v, u, w = velocity.tolist()
-    return deskew(scan, v, w, u) if _is_swept(scan) else scan
+    return deskew(scan, v, w, u) if is_swept(scan) else scan

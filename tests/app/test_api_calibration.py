@@ -85,6 +85,7 @@ def test_a_recording_with_fewer_scans_is_taken_once_however_often_it_loops(serve
     assert (state["state"], state["scans"]) == ("done", 12)
 
 
+@pytest.mark.long
 def test_a_scan_that_is_shown_again_while_paused_counts_once(server: Server, standing: Path) -> None:
     server.play(standing, paused=True)
     server.change("POST", "/calibration", {})
@@ -102,6 +103,7 @@ def test_a_scan_that_is_shown_again_while_paused_counts_once(server: Server, sta
     wait_until(lambda: server.get("/calibration")["scans"] > 2)
 
 
+@pytest.mark.long
 def test_before_the_kernels_are_compiled_it_says_so(tmp_path: Path) -> None:
     """An app that was not started yet: nothing is compiled, and nothing plays."""
     app = create_app(ServerOptions(recordings=tmp_path, device=DeviceOptions(emulated=True)))
@@ -274,6 +276,7 @@ def test_a_folder_that_cannot_be_written_is_a_problem(server: Server) -> None:
     assert server.get("/profiles")["profiles"] == []
 
 
+@pytest.mark.long
 def test_the_client_calibrates_saves_and_uses(server: Server, standing: Path) -> None:
     server.play(standing)
     with Client(server.url) as robot:

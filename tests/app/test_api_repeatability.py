@@ -233,6 +233,7 @@ def test_a_sensor_that_is_pushed_is_said_to_have_moved(server: Server) -> None:
     assert found(server)["scans"] < 15
 
 
+@pytest.mark.long
 def test_looking_back_at_a_live_source_neither_counts_twice_nor_begins_anew(watching: Server) -> None:
     frames: list[Frame] = []
     watching.runtime.frame_listeners.append(frames.append)

@@ -128,6 +128,7 @@ def test_a_recording_keeps_the_pace_of_its_stamps(tmp_path: Path, speed: int) ->
     assert soonest(too_slow_by, 0.2 / speed) <= 0.2 / speed
 
 
+@pytest.mark.long
 def test_at_the_end_it_stops_and_playing_on_starts_again(server: Server) -> None:
     room = write_room(server.folder / "short.npz", scans=4)
     seen: list[int] = []

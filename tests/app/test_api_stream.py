@@ -112,6 +112,7 @@ def test_a_slow_client_gets_fewer_frames_and_then_no_old_ones(server: Server) ->
     assert late < 400 * len(text) / 20
 
 
+@pytest.mark.long
 def test_twenty_clients_get_every_frame_in_order_and_memory_does_not_grow(
     tmp_path: Path, free_port: Callable[[], int]
 ) -> None:

@@ -110,6 +110,7 @@ def test_a_geojson_collection_holds_every_scan(tables: dict[str, Path]) -> None:
     assert_rows(rows, tables["geojson"].parent)
 
 
+@pytest.mark.long
 def test_processing_what_breaks_leaves_no_file_and_the_old_one_as_it_was(tmp_path: Path) -> None:
     garbage = tmp_path / "garbage.bag"
     garbage.write_bytes(b"#ROSBAG V2.0\n" + bytes(range(256)) * 20)
@@ -142,6 +143,7 @@ def test_a_bad_setting_is_named(tmp_path: Path, setting: str, words: list[str]) 
     assert_refused(run("process", "any.bag", "-o", tmp_path / "x.csv", "--set", setting), *words)
 
 
+@pytest.mark.long
 def test_settings_come_from_a_file_and_from_the_line(tmp_path: Path) -> None:
     room = write_room(tmp_path / "room.npz", scans=2)
     file = tmp_path / "settings.json"
@@ -174,6 +176,7 @@ def test_serve_prints_its_address_plays_the_recording_and_ends_on_ctrl_c(
     assert server.process.returncode == 0
 
 
+@pytest.mark.long
 def test_a_busy_port_is_said_to_be(serving: Callable[..., Serving], free_port: Callable[[], int]) -> None:
     with listen("127.0.0.1", 0) as listening:
         port = listening.getsockname()[1]
@@ -182,12 +185,14 @@ def test_a_busy_port_is_said_to_be(serving: Callable[..., Serving], free_port: C
     assert_refused(run("serve", "--host", "no.such.host.invalid"), "no.such.host.invalid")
 
 
+@pytest.mark.long
 def test_what_cannot_be_served_is_said_before_anything_listens(tmp_path: Path) -> None:
     assert_refused(run("serve", "--port", 0, tmp_path / "none.bag"), "none.bag")
     (tmp_path / "empty.bag").touch()
     assert_refused(run("serve", "--port", 0, tmp_path / "empty.bag"), "empty")
 
 
+@pytest.mark.long
 def test_beyond_this_machine_a_token_is_demanded(serving: Callable[..., Serving], background: Path) -> None:
     server = serving(background, "--port", 0, "--host", "0.0.0.0")
     port, token = re.fullmatch(r"http://[^/]+:(\d+)/\?token=(\S{20,})", server.url).groups()
@@ -196,6 +201,7 @@ def test_beyond_this_machine_a_token_is_demanded(serving: Callable[..., Serving]
     assert httpx.get(url, headers={"authorization": f"Bearer {token}"}).status_code == 200
 
 
+@pytest.mark.long
 def test_a_token_of_ones_own_is_demanded_anywhere(serving: Callable[..., Serving], background: Path) -> None:
     server = serving(background, "--port", 0, "--token", "my-token")
     assert server.url.endswith("/?token=my-token")

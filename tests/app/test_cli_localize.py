@@ -39,6 +39,7 @@ def poses_of(path: Path) -> np.ndarray:
         )
 
 
+@pytest.mark.long
 def test_a_map_that_slam_saved_is_one_to_localize_in(
     scans: list[Scan], recording: Path, tmp_path: Path
 ) -> None:
@@ -69,6 +70,7 @@ def test_a_map_of_whole_scans_has_the_poses_of_all_scans(
     assert np.linalg.norm(poses_of(poses)[:, :2] - true[:, :2], axis=1).max() < 0.1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

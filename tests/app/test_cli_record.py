@@ -31,6 +31,7 @@ def is_among(captured, scan):
     return abs(nearest.stamp - scan.stamp) < 0.02 and len(nearest) == len(scan)
 
 
+@pytest.mark.long
 def test_it_records_for_a_while_and_says_how_much(tmp_path):
     output, raw = tmp_path / "a.mcap", tmp_path / "a.rplidar"
     began = time.monotonic()
@@ -48,6 +49,7 @@ def test_it_records_for_a_while_and_says_how_much(tmp_path):
     assert sum(is_among(captured, scan) for scan in scans) >= len(scans) - 2
 
 
+@pytest.mark.long
 def test_a_sensor_that_goes_away_is_told_of_at_the_end(tmp_path):
     output = tmp_path / "a.mcap"
     with EmulatorProcess() as emulator:
@@ -63,6 +65,7 @@ def test_a_sensor_that_goes_away_is_told_of_at_the_end(tmp_path):
     assert "went away: check the sensor's cable" in complaint
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_ends_it_properly(tmp_path, number):
     output = tmp_path / "a.mcap"
@@ -96,6 +99,7 @@ def test_a_signal_ends_waiting_for_an_answer_and_leaves_nothing(tmp_path):
         os.close(end)
 
 
+@pytest.mark.long
 def test_under_nohup_a_hangup_is_ignored(tmp_path):
     output = tmp_path / "a.mcap"
     command = ["nohup", *COMMAND, output, "--emulator", "--duration", "2"]
@@ -111,6 +115,7 @@ def test_under_nohup_a_hangup_is_ignored(tmp_path):
     assert float(re.search(r"\d+ scans in (\d+\.\d) s", said)[1]) >= 1.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("wish", "complaint"),
     [

@@ -35,6 +35,7 @@ class Client(httpx.Client):
         wait_until(lambda: self.source()["index"] >= count)
 
 
+@pytest.mark.long
 def test_without_an_argument_it_takes_an_emulated_sensor_and_says_so(serving: Serve) -> None:
     server = serving("--http-port", 0)
     with Client(server) as client:
@@ -46,6 +47,7 @@ def test_without_an_argument_it_takes_an_emulated_sensor_and_says_so(serving: Se
     assert server.end()[1] == ""
 
 
+@pytest.mark.long
 def test_the_port_named_is_taken_and_run_as_asked(serving: Serve, sensor: EmulatorProcess) -> None:
     server = serving("--http-port", 0, "--port", sensor.port, "--mode", "Standard", "--rpm", 720)
     with Client(server) as client:
@@ -55,6 +57,7 @@ def test_the_port_named_is_taken_and_run_as_asked(serving: Serve, sensor: Emulat
         client.wait_for_scans()
 
 
+@pytest.mark.long
 def test_a_port_that_is_a_number_is_that_of_the_dashboard(
     serving: Serve, free_port: Callable[[], int], background: Path
 ) -> None:
@@ -62,6 +65,7 @@ def test_a_port_that_is_a_number_is_that_of_the_dashboard(
     assert serving(background, "--port", port).url == f"http://127.0.0.1:{port}/"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -86,6 +90,7 @@ def test_one_source_at_a_time(first: str) -> None:
     assert result.stdout == ""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_nothing_is_left_of_the_emulator(serving: Serve, tmp_path: Path, number: int) -> None:
     temporary = tmp_path / "temporary"
@@ -109,6 +114,7 @@ def streams(port: str, within: float = 0.3) -> bool:
         return bool(line.read(1))
 
 
+@pytest.mark.long
 def test_a_signal_stops_the_motor_and_closes_the_recording(
     serving: Serve, sensor: EmulatorProcess, tmp_path: Path
 ) -> None:
@@ -141,6 +147,7 @@ def test_killed_at_once_it_loses_a_second_at_most_and_the_next_one_takes_the_sen
         client.wait_for_scans()
 
 
+@pytest.mark.long
 def test_a_full_disk_ends_the_recording_and_the_view_goes_on(
     serving: Serve, sensor: EmulatorProcess, tmp_path: Path
 ) -> None:

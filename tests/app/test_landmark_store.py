@@ -77,6 +77,7 @@ def moved(by: float) -> np.ndarray:
     return np.array([[0, 0], [1 + by, 0], [2, 0]])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("columns", "is_written"),
     [
@@ -228,6 +229,7 @@ def test_a_running_map_that_was_cleared_or_deleted_is_written_again_but_not_when
     assert store.error is None
 
 
+@pytest.mark.long
 def test_a_locked_file_is_reported_holds_up_nobody_and_catches_up(store: LandmarkStore) -> None:
     told, run = Told(store), store.begin("room.mcap")
     run.put(landmarks(1))
@@ -253,6 +255,7 @@ def test_a_locked_file_is_reported_holds_up_nobody_and_catches_up(store: Landmar
     assert not told.changes
 
 
+@pytest.mark.long
 def test_a_full_disk_is_reported_and_the_map_is_written_when_there_is_room(tmp_path: Path) -> None:
     script = """
 import resource, signal, sys, time
@@ -330,6 +333,7 @@ def test_no_landmark_confirmed_a_second_ago_is_lost_when_the_process_is_killed(t
         assert atlas.session(1).ended is None
 
 
+@pytest.mark.long
 def test_what_a_server_told_of_its_map_is_there_after_it_was_killed(
     serving: Callable[..., Serving], tmp_path: Path
 ) -> None:

@@ -45,6 +45,7 @@ def refused(live: Server, status: int, body: Json) -> str:
     return detail
 
 
+@pytest.mark.long
 def test_no_such_port(live: Server) -> None:
     assert "There is no port /dev/ttyUSB98" in refused(live, 404, {"kind": "device", "port": "/dev/ttyUSB98"})
 
@@ -53,6 +54,7 @@ def test_no_serial_port(live: Server) -> None:
     assert "cannot be used as a serial port" in refused(live, 404, {"kind": "device", "port": "/dev/null"})
 
 
+@pytest.mark.long
 def test_a_port_that_another_program_has(live: Server) -> None:
     with EmulatorProcess() as other:
         command = [sys.executable, "-c", HOLD, other.port]
@@ -64,6 +66,7 @@ def test_a_port_that_another_program_has(live: Server) -> None:
     assert f"(pid {holder.pid})" in detail
 
 
+@pytest.mark.long
 def test_another_baud_rate_is_named(live: Server) -> None:
     with EmulatorProcess(baud=115_200) as other:
         assert "talks at 115200 baud" in refused(live, 504, {"kind": "device", "port": other.port})
@@ -71,6 +74,7 @@ def test_another_baud_rate_is_named(live: Server) -> None:
         assert "Turbo" in refused(live, 422, body)
 
 
+@pytest.mark.long
 def test_a_sensor_that_protects_itself(live: Server) -> None:
     with EmulatorProcess(health=2, health_code=7, health_sticks=True, reset=0.1) as other:
         assert "7" in refused(live, 503, {"kind": "device", "port": other.port})

@@ -27,6 +27,7 @@ def test_unplugged_it_says_so_and_goes_on_when_it_is_back(watching: Server, sens
     assert after["source"]["index"] > before["source"]["index"]
 
 
+@pytest.mark.long
 def test_a_stall_is_named_and_passes(watching: Server, sensor: EmulatorProcess) -> None:
     with watching.stream() as stream:
         settled(stream)
@@ -36,6 +37,7 @@ def test_a_stall_is_named_and_passes(watching: Server, sensor: EmulatorProcess) 
         assert (told["error"], told["reconnects"]) == (None, 0)
 
 
+@pytest.mark.long
 def test_lost_capsules_are_sectors_without_points_and_counted(
     watching: Server, sensor: EmulatorProcess
 ) -> None:
@@ -59,6 +61,7 @@ def test_lost_capsules_are_sectors_without_points_and_counted(
             assert not inside.any()
 
 
+@pytest.mark.long
 def test_the_port_is_handed_over_to_the_same_sensor_run_otherwise(
     watching: Server, sensor: EmulatorProcess
 ) -> None:
@@ -85,6 +88,7 @@ def test_if_it_cannot_be_run_so_it_goes_on_as_it_was(watching: Server, sensor: E
         assert revolutions(stream, 2)
 
 
+@pytest.mark.long
 def test_the_emulator_plays_obeys_and_ends_with_its_source(server: Server, room: object) -> None:
     with server.stream() as stream:
         assert_problem(server.http.post("/emulator", json={"command": "unplug"}), 409)

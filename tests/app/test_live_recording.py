@@ -78,6 +78,7 @@ def test_what_is_recorded_is_what_was_shown(watching: Server, sensor: EmulatorPr
         assert_is_what_was_shown(scan, frame)
 
 
+@pytest.mark.long
 def test_a_paused_view_does_not_hold_it_up_and_what_was_recorded_plays(watching: Server) -> None:
     with watching.stream() as stream:
         settled(stream)
@@ -105,6 +106,7 @@ def test_without_a_name_it_is_called_by_date_and_time(watching: Server) -> None:
     assert (watching.folder / name).is_file()
 
 
+@pytest.mark.long
 def test_the_bytes_of_the_port_replay_to_the_same_scans(watching: Server) -> None:
     with watching.stream() as stream:
         settled(stream)
@@ -126,6 +128,7 @@ def same(some: np.ndarray, others: np.ndarray) -> bool:
     return len(some) == len(others) and np.allclose(some, others, atol=1e-4, equal_nan=True)
 
 
+@pytest.mark.long
 def test_it_goes_on_over_an_interruption(watching: Server, sensor: EmulatorProcess) -> None:
     with watching.stream() as stream:
         start(watching, name="hall")
@@ -141,6 +144,7 @@ def test_it_goes_on_over_an_interruption(watching: Server, sensor: EmulatorProce
     assert max(after.stamp - before.stamp for before, after in pairwise(scans)) > 0.3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("raw", [False, True])
 def test_another_source_ends_it(watching: Server, sensor: EmulatorProcess, room: Path, raw: bool) -> None:
     with watching.stream() as stream:

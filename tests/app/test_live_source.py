@@ -71,6 +71,7 @@ def test_frames_come_at_the_sensors_rate_numbered_and_stamped(watching: Server) 
     )
 
 
+@pytest.mark.long
 def test_the_last_byte_of_a_revolution_is_sent_on_at_once(watching: Server) -> None:
     layers = {"rejected": True}
     watching.change("PATCH", "/settings", {"view": {"compare": True, "colour": "quality", "layers": layers}})
@@ -87,6 +88,7 @@ def test_the_last_byte_of_a_revolution_is_sent_on_at_once(watching: Server) -> N
         assert soonest(latency, 5) <= AT_ONCE
 
 
+@pytest.mark.long
 def test_counters_are_told_at_least_once_a_second(watching: Server) -> None:
     with watching.stream() as stream:
         watching.change("PATCH", "/source", {"state": "paused"})
@@ -95,6 +97,7 @@ def test_counters_are_told_at_least_once_a_second(watching: Server) -> None:
     assert 0 < np.median(np.diff(seen)) <= 10, seen
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("mode", "beams"), [("Standard", 1e6 / 244 / 10), ("DenseBoost", 1e6 / 108 / 10)])
 def test_the_mode_decides_how_many_beams_a_revolution_has(
     server: Server, sensor: EmulatorProcess, mode: str, beams: float
@@ -107,6 +110,7 @@ def test_the_mode_decides_how_many_beams_a_revolution_has(
     assert len(frame["corners"]) >= 4
 
 
+@pytest.mark.long
 def test_the_speed_changes_while_it_plays(watching: Server) -> None:
     with watching.stream() as stream:
         settled(stream)
@@ -148,6 +152,7 @@ def test_while_paused_kept_revolutions_are_stepped_through_and_playing_shows_the
     assert watching.get("/source")["count"] is None
 
 
+@pytest.mark.long
 def test_what_is_looked_at_stays_when_it_is_older_than_what_is_kept(
     server: Server, sensor: EmulatorProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:

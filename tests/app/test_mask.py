@@ -90,6 +90,7 @@ def test_whoever_is_told_of_frames_gets_the_scan_without_the_body(server: Server
     assert not seen[-1].valid[on_posts(seen[-1])].any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mask", "said"),
     [
@@ -126,6 +127,7 @@ def _ahead(path: Path) -> np.ndarray:
         return (np.abs(scan.bearings) < 1) & (scan.ranges < 10)
 
 
+@pytest.mark.long
 def test_commands_take_the_mask_that_is_kept_or_given(tmp_path: Path) -> None:
     write(tmp_path / "kept.mcap", MASK, count=6)
     write(tmp_path / "raw.mcap", count=6)

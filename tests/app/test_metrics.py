@@ -1,6 +1,7 @@
 """What Prometheus would read, read by its own parser."""
 
 import httpx
+import pytest
 from prometheus_client.parser import text_string_to_metric_families
 from sensing import device, revolutions, settled, watch
 from serving import Json, Server
@@ -43,6 +44,7 @@ def test_of_a_recording_frames_are_counted_and_timed_and_no_sensor_is_spoken_of(
     assert not [name for name in after if "sensor" in name]
 
 
+@pytest.mark.long
 def test_the_sensors_counters_are_those_of_the_source_and_move(
     server: Server, sensor: EmulatorProcess
 ) -> None:
@@ -80,6 +82,7 @@ def assert_tells(samples: dict[str, float], earlier: Json, later: Json) -> None:
         assert 0 < count <= told <= later["dropped"][reason]
 
 
+@pytest.mark.long
 def test_recording_and_interruption_show(server: Server, sensor: EmulatorProcess) -> None:
     watch(server, sensor)
     server.change("POST", "/recorder/start", {"name": "hall"})
@@ -98,6 +101,7 @@ def test_recording_and_interruption_show(server: Server, sensor: EmulatorProcess
     assert scrape(server)["lidarcore_sensor_reconnects_total"] == 1
 
 
+@pytest.mark.long
 def test_what_is_looked_at_again_is_not_late(server: Server, sensor: EmulatorProcess) -> None:
     watch(server, sensor)
     with server.stream() as stream:

@@ -23,6 +23,7 @@ def _no_collector() -> Iterator[None]:
     gc.enable()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_no_collector")
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_was_replaced_is_freed(server: Server, sensor: EmulatorProcess, room: Path, kind: str) -> None:

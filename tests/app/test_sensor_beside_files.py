@@ -31,6 +31,7 @@ def server(serving: Callable[..., Serving], sensor: EmulatorProcess) -> Iterator
         yield client
 
 
+@pytest.mark.long
 def test_the_sensor_loses_nothing_while_files_are_read(server: httpx.Client, tmp_path: Path) -> None:
     losses = [lost(server, tmp_path / "recordings", f"beside{i}.mcap") for i in range(TRIES)]
     assert [] in losses, losses

@@ -108,6 +108,7 @@ def test_a_cancelled_study_is_gone_with_its_process_and_leaves_nothing(server: S
     assert_problem(server.http.delete("/studies/running"), 404)
 
 
+@pytest.mark.long
 def test_one_at_a_time(server: Server) -> None:
     started(server, "consistency", LONG)
     problem = assert_problem(server.http.post("/studies/cwlf", json={}), 409)
@@ -191,6 +192,7 @@ def test_the_schema_says_what_can_be_chosen(shared_server: Server) -> None:
         assert {"quick", "seed"} < set(kind["schema"]["properties"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_a_study_ends_with_the_server(serving: Callable[..., Serving], room: Path, number: int) -> None:
     """However that ends."""
@@ -270,6 +272,7 @@ def test_only_lines_of_progress_are_taken_for_it(line: str, parts: tuple[int, in
     assert parts_done(line) == parts
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("study", ["cwlf", "wctls"])
 def test_the_parts_told_go_up_to_all(study: str, tmp_path: Path, room: Path) -> None:
     """The input stays open until the end, as a program keeps it."""

@@ -102,6 +102,7 @@ def test_a_map_that_is_deleted_while_it_grows_begins_again(tmp_path: Path) -> No
         assert [astuple(wall)[0] for wall in store.atlas[2].walls()] == [0, 1]
 
 
+@pytest.mark.long
 def test_what_a_server_told_of_its_walls_is_there_after_it_was_killed(
     serving: Callable[..., Serving], tmp_path: Path
 ) -> None:

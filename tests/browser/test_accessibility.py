@@ -75,6 +75,7 @@ def contrast(a: list[float], b: list[float]) -> float:
     return (high + 0.05) / (low + 0.05)
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     phone.server.patch("settings", MAPPED)
@@ -92,6 +93,7 @@ def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     expect(phone.page.frame_locator("#scene").get_by_text("Connected")).to_be_hidden()
 
 
+@pytest.mark.long
 def test_narrow_page_plays_and_selects(phone: Visitor) -> None:
     phone.page.get_by_role("button", name="Pause").tap()
     wait_until(lambda: phone.server.get("source")["state"] == "paused", "it is paused")
@@ -100,6 +102,7 @@ def test_narrow_page_plays_and_selects(phone: Visitor) -> None:
     wait_until(lambda: phone.server.get("selection")["corner"], "a corner is selected")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], theme: str) -> None:
     visitor = visit(1400, 900, theme=theme, reduced_motion="reduce").open()  # else colours would fade in
@@ -118,6 +121,7 @@ def test_text_stands_out_in_the_preferred_theme(visit: Callable[..., Visitor], t
         assert weak == [], panel
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_theme_button_turns_the_page_and_the_scene(visit: Callable[..., Visitor]) -> None:
     visitor = visit(theme="dark").open()
@@ -148,6 +152,7 @@ def controls(nodes: list[dict[str, Any]]) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.long
 def test_every_control_has_a_name_of_its_own(visitor: Visitor) -> None:
     visitor.server.patch("settings", MAPPED)
     visitor.await_frame(visitor.server.pause())
@@ -179,6 +184,7 @@ def test_axe_finds_nothing_on_any_tab(visit: Callable[..., Visitor], theme: str)
         assert violations == [], panel
 
 
+@pytest.mark.long
 def test_axe_finds_nothing_on_a_phone(phone: Visitor) -> None:
     phone.server.patch("settings", MAPPED)
     phone.await_frame(phone.server.pause())
@@ -193,6 +199,7 @@ def test_axe_finds_nothing_on_a_phone(phone: Visitor) -> None:
         assert phone.page.evaluate(LOOK_FOR_VIOLATIONS) == [], panel
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [1400, 390])
 @pytest.mark.parametrize("path", ["studies", "guide"])
 def test_axe_finds_nothing_on_the_other_pages(visit: Callable[..., Visitor], path: str, width: int) -> None:
@@ -221,6 +228,7 @@ def test_phone_reaches_all_tools_and_keeps_the_view_free(phone: Visitor) -> None
     wait_until(lambda: card.bounding_box()["height"] < 60, "it is folded")
 
 
+@pytest.mark.long
 def test_page_has_landmarks_and_a_table_that_can_be_read_out(visitor: Visitor) -> None:
     page = visitor.page
     for role in ("banner", "main"):
@@ -236,6 +244,7 @@ def test_page_has_landmarks_and_a_table_that_can_be_read_out(visitor: Visitor) -
     assert page.locator("#scene").get_attribute("title")
 
 
+@pytest.mark.long
 def test_reduced_motion_is_respected(visit: Callable[..., Visitor]) -> None:
     still, moving = visit(reduced_motion="reduce").open(), visit(reduced_motion="no-preference").open()
     duration = "getComputedStyle(document.getElementById('help')).transitionDuration"

@@ -3,10 +3,12 @@
 import re
 from collections.abc import Callable
 
+import pytest
 from browsing import Server, Visitor
 from playwright.sync_api import expect
 
 
+@pytest.mark.long
 def test_a_route_can_be_tried_out(visit: Callable[..., Visitor], server: Server) -> None:
     visitor = visit()
     page = visitor.page
@@ -21,6 +23,7 @@ def test_a_route_can_be_tried_out(visit: Callable[..., Visitor], server: Server)
     assert all(url.startswith((server.url, "data:", "blob:")) for url in visitor.asked)
 
 
+@pytest.mark.long
 def test_every_group_of_routes_is_listed(visit: Callable[..., Visitor], server: Server) -> None:
     page = visit().page
     page.goto(f"{server.url}/docs")

@@ -60,6 +60,7 @@ def paused(visitor: Visitor) -> None:
     visitor.server.patch("source", {"state": "paused"})
 
 
+@pytest.mark.long
 def test_noise_of_a_sensor_is_found_used_and_kept_as_a_profile(
     visitor: Visitor, sensor: EmulatorProcess
 ) -> None:
@@ -119,6 +120,7 @@ def test_noise_of_a_sensor_is_found_used_and_kept_as_a_profile(
     expect(profile(visitor, "RPLIDAR A1 or A2")).to_contain_text("14 places in three recordings")
 
 
+@pytest.mark.long
 def test_what_cannot_be_told_is_said_and_what_is_set_stays(visitor: Visitor, tmp_path: Path) -> None:
     """A narrow view of one wall: a bearing error does nothing there."""
     server, page = visitor.server, visitor.page
@@ -144,6 +146,7 @@ def test_what_cannot_be_told_is_said_and_what_is_set_stays(visitor: Visitor, tmp
     assert noise(server) == used(found, before)
 
 
+@pytest.mark.long
 def test_a_second_start_is_refused_and_shows_the_one_that_runs(visitor: Visitor) -> None:
     visitor.tolerated.append("409")
     server, page = visitor.server, visitor.page
@@ -171,6 +174,7 @@ def test_another_source_ends_it_in_plain_words(visitor: Visitor) -> None:
     expect(page.get_by_role("button", name="Calibrate")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_files_are_imported_replaced_on_demand_or_refused(visitor: Visitor, tmp_path: Path) -> None:
     visitor.tolerated += ["409", "422"]
     server, page = visitor.server, visitor.page
@@ -192,6 +196,7 @@ def test_files_are_imported_replaced_on_demand_or_refused(visitor: Visitor, tmp_
     assert [entry["name"] for entry in server.get("profiles")["profiles"]] == ["lab"]
 
 
+@pytest.mark.long
 def test_a_damaged_file_is_told_of(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     folder = Path(server.get("profiles")["folder"])

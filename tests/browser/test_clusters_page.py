@@ -43,6 +43,7 @@ def test_method_is_switched_live_and_shows_only_what_it_uses(visitor: Visitor) -
         )
 
 
+@pytest.mark.long
 def test_number_of_clusters_is_chosen_by_the_page_or_for_every_scan(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     server.patch("settings", {"clusters": {"method": "kmeans"}, "view": {"layers": {"clusters": True}}})
@@ -58,6 +59,7 @@ def test_number_of_clusters_is_chosen_by_the_page_or_for_every_scan(visitor: Vis
     wait_until(lambda: "k_max" in shown_parameters(visitor), "there is something to choose")
 
 
+@pytest.mark.long
 @pytest.mark.scene
 @pytest.mark.real_data
 def test_clusters_are_drawn_where_they_are_shown(visitor: Visitor) -> None:

@@ -25,6 +25,7 @@ def newcomer(visit: Callable[..., Visitor]) -> Visitor:
     return visitor
 
 
+@pytest.mark.long
 def test_methods_are_compared_on_a_corner_that_all_found(newcomer: Visitor) -> None:
     server = newcomer.server
     newcomer.tolerated.append("404")  # the corner that it selects, or asks about, may be gone by then
@@ -74,6 +75,7 @@ def test_a_map_is_built(newcomer: Visitor) -> None:
     expect(page.get_by_role("tab", name="Map")).to_have_attribute("aria-selected", "true")
 
 
+@pytest.mark.long
 def test_the_strip_is_closed(newcomer: Visitor) -> None:
     newcomer.page.get_by_role("button", name="Close the first steps").click()
     closed(newcomer)

@@ -51,6 +51,7 @@ def test_the_guide_fits_the_screen_and_asks_for_nothing_else(
         assert formula.bounding_box()["height"] > 20
 
 
+@pytest.mark.long
 def test_the_dashboard_leads_to_the_guide_and_back(visitor: Visitor) -> None:
     visitor.page.get_by_role("link", name="Guide").click()
     expect(visitor.page).to_have_url(f"{visitor.server.url}/guide")

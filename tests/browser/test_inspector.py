@@ -84,6 +84,7 @@ def test_wall_clicked_tells_what_each_method_says_of_it(compared: Visitor) -> No
     expect(card).to_contain_text("Covarianceconsistent")
 
 
+@pytest.mark.long
 def test_wall_shows_its_repeatability(compared: Visitor) -> None:
     frame = compared.server.get("frame")
     wall, _ = whole_wall(frame)
@@ -104,6 +105,7 @@ def test_wall_shows_its_repeatability(compared: Visitor) -> None:
         expect(item).to_contain_text(f"{inside} of {sighted['count']} inside")
 
 
+@pytest.mark.long
 def test_wall_and_corner_lead_to_each_other_and_escape_ends_both(compared: Visitor) -> None:
     wall, _ = whole_wall(compared.server.get("frame"))
     card = click(compared, wall)

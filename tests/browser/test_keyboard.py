@@ -46,6 +46,7 @@ def test_key_does_what_the_help_says(keys: Visitor, key: str, holds: Callable[[S
     wait_until(lambda: holds(keys.server), f"{key} has worked")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("key", OWN)
 def test_key_changes_the_view_of_this_browser_only(keys: Visitor, key: str) -> None:
     before = view(keys.server)

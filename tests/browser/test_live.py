@@ -91,6 +91,7 @@ def pressed(live: Watched, name: str) -> None:
     expect(button).to_have_attribute("aria-pressed", "true")
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_source_is_switched_while_it_runs(live: Watched) -> None:
     (live.server.folder / GOLF.name).write_bytes(GOLF.read_bytes())
@@ -108,6 +109,7 @@ def test_source_is_switched_while_it_runs(live: Watched) -> None:
     expect(live.page.locator("#readout-source")).to_have_text(GOLF.name)
 
 
+@pytest.mark.long
 def test_demo_that_comes_along_plays_and_cannot_be_deleted(live: Watched) -> None:
     demo, real = (
         entry["name"] for entry in live.server.get("recordings")["recordings"] if entry.get("builtin")
@@ -126,6 +128,7 @@ def test_demo_that_comes_along_plays_and_cannot_be_deleted(live: Watched) -> Non
     expect(live.page.get_by_role("button", name=f"Delete {demo}")).to_have_count(0)
 
 
+@pytest.mark.long
 def test_device_that_is_not_there_is_refused_with_the_cure_and_the_emulator_goes_on(live: Watched) -> None:
     answer = live.server.api.put("source", json={"kind": "device", "port": "/dev/ttyUSB99"})
     assert answer.status_code == 404
@@ -134,6 +137,7 @@ def test_device_that_is_not_there_is_refused_with_the_cure_and_the_emulator_goes
     pressed(live, "Emulator")
 
 
+@pytest.mark.long
 def test_device_unplugged_and_plugged_in_again_under_the_page(live: Watched) -> None:
     with EmulatorProcess(seed=3) as lidar:
         choice = {"kind": "device", "port": lidar.port}
@@ -155,6 +159,7 @@ def test_device_unplugged_and_plugged_in_again_under_the_page(live: Watched) -> 
         live.expect_streaming()
 
 
+@pytest.mark.long
 def test_faults_of_the_emulator_are_seen_in_the_page(live: Watched) -> None:
     live.press("Unplug")
     live.expect_cut_off()
@@ -173,6 +178,7 @@ def test_faults_of_the_emulator_are_seen_in_the_page(live: Watched) -> None:
     expect(live.page.locator("#device-losses")).to_contain_text("nothing")
 
 
+@pytest.mark.long
 def test_emulator_that_was_killed_is_told_of_and_another_one_is_started(live: Watched) -> None:
     message = live.page.locator(".toast.error")
     live.server.kill_emulator()
@@ -189,6 +195,7 @@ def test_emulator_that_was_killed_is_told_of_and_another_one_is_started(live: Wa
     expect(message).to_have_count(0)
 
 
+@pytest.mark.long
 def test_refusal_is_told_in_plain_words_until_something_else_is_opened(visitor: Visitor) -> None:
     visitor.tolerated.append("404")
     page, message = visitor.page, visitor.page.locator(".toast.error")
@@ -203,6 +210,7 @@ def test_refusal_is_told_in_plain_words_until_something_else_is_opened(visitor: 
     expect(message).to_have_count(0)
 
 
+@pytest.mark.long
 def test_message_goes_by_itself_but_not_while_it_has_the_focus(visit: Callable[..., Visitor]) -> None:
     visitor = visit()
     visitor.page.clock.install()
@@ -246,6 +254,7 @@ def test_live_view_is_frozen_stepped_back_and_live_again(live: Watched) -> None:
     live.expect_streaming()
 
 
+@pytest.mark.long
 def test_link_to_a_live_view_shows_what_is_live_now(live: Watched, visit: Callable[..., Visitor]) -> None:
     live.page.wait_for_url("**#live=emulator*")
     assert "recording=" not in live.page.url

@@ -135,6 +135,7 @@ def test_without_a_map_there_is_nothing_to_save_or_clear(mapped: Visitor) -> Non
     expect(page.locator("#map-save a")).to_have_count(0)
 
 
+@pytest.mark.long
 @pytest.mark.scene
 @pytest.mark.real_data
 def test_landmark_clicked_shows_its_covariance_and_history(mapped: Visitor) -> None:
@@ -155,6 +156,7 @@ def test_landmark_clicked_shows_its_covariance_and_history(mapped: Visitor) -> N
     wait_until(lambda: server.get("selection")["landmark"] is None, "none is selected")
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_innovations_are_charted_with_the_band_they_should_lie_in(mapped: Visitor) -> None:
     page = mapped.page
@@ -176,6 +178,7 @@ def test_innovations_are_charted_with_the_band_they_should_lie_in(mapped: Visito
     expect(figure).to_have_count(0)
 
 
+@pytest.mark.long
 @pytest.mark.scene
 @pytest.mark.real_data
 def test_pose_is_set_by_dragging_in_the_scene(mapped: Visitor) -> None:
@@ -220,6 +223,7 @@ def drag(page: Page, start: NDArray[np.float64], end: NDArray[np.float64]) -> No
     page.mouse.up()
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_one_click_in_the_scene_selects_the_landmark_and_the_corner_on_top_of_it(mapped: Visitor) -> None:
     page, server = mapped.page, mapped.server
@@ -245,6 +249,7 @@ def test_one_click_in_the_scene_selects_the_landmark_and_the_corner_on_top_of_it
     expect(page.get_by_role("heading", name=f"Landmark L{wanted['id']}")).to_be_in_viewport()
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_setting_a_pose_is_given_up_by_escape_and_can_be_done_in_numbers(mapped: Visitor) -> None:
     page = mapped.page
@@ -290,6 +295,7 @@ def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
     assert session not in [entry["id"] for entry in server.get("sessions")["sessions"]]
 
 
+@pytest.mark.long
 def test_file_that_is_no_map_is_refused_in_plain_words(mapped: Visitor) -> None:
     mapped.tolerated.append("422")
     file = {"name": "room.json", "mimeType": "application/json", "buffer": b'{"unit": "mm"}'}
@@ -297,6 +303,7 @@ def test_file_that_is_no_map_is_refused_in_plain_words(mapped: Visitor) -> None:
     expect(mapped.page.locator(".toast.error")).to_contain_text("convert it")
 
 
+@pytest.mark.long
 def test_link_keeps_the_mode_and_what_the_landmarks_are(
     mapped: Visitor, visit: Callable[..., Visitor]
 ) -> None:
@@ -311,6 +318,7 @@ def test_link_keeps_the_mode_and_what_the_landmarks_are(
     assert server.get("settings")["navigation"].items() >= mode.items()
 
 
+@pytest.mark.long
 def test_map_of_the_recording_opened_next_is_shown_at_once(mapped: Visitor) -> None:
     """SLAM goes on from the emulator into a recording, whose map is another one."""
     server, page = mapped.server, mapped.page
@@ -330,6 +338,7 @@ def test_map_of_the_recording_opened_next_is_shown_at_once(mapped: Visitor) -> N
     )
 
 
+@pytest.mark.long
 def test_simulation_is_set_up_and_started(mapped: Visitor) -> None:
     page, server = mapped.page, mapped.server
     page.get_by_role("tab", name="Source").click()

@@ -72,6 +72,7 @@ def test_a_suggested_mask_takes_the_robot_out_of_the_scan(visitor: Visitor, robo
     wait_until(lambda: nearest(visitor) < 0.4, "the robot is back")
 
 
+@pytest.mark.long
 def test_sectors_are_given_as_numbers_in_degrees(visitor: Visitor, robot: Path) -> None:
     section = loaded(visitor, robot)
     section.get_by_role("button", name="Add a sector").click()
@@ -95,6 +96,7 @@ def test_sectors_are_given_as_numbers_in_degrees(visitor: Visitor, robot: Path) 
     wait_until(taken, "the first is deleted")
 
 
+@pytest.mark.long
 def test_why_there_is_no_suggestion_is_said(visitor: Visitor) -> None:
     """The sensor that plays stands still."""
     visitor.tolerated.append("409")
@@ -104,6 +106,7 @@ def test_why_there_is_no_suggestion_is_said(visitor: Visitor) -> None:
     expect(visitor.page.locator("#toasts")).to_contain_text("The sensor hardly moved")
 
 
+@pytest.mark.long
 def test_on_a_phone_nothing_is_cut_off(visit: Callable[..., Visitor], robot: Path) -> None:
     phone = visit(390, 844, has_touch=True, is_mobile=True).open()
     section = loaded(phone, robot)

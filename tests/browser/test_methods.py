@@ -16,6 +16,7 @@ pytestmark = pytest.mark.real_data
 METHODS = ("arras_siegwart", "cwlf", "utls", "wtls", "wctls", "ml")
 
 
+@pytest.mark.long
 def test_fitter_chosen_in_the_page_makes_the_frames(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     for name in ("cwlf", "utls"):
@@ -65,6 +66,7 @@ def test_comparison_fills_the_table_for_every_method(visitor: Visitor) -> None:
             assert area == pytest.approx(1e6 * measured["area"], abs=0.51)
 
 
+@pytest.mark.long
 def test_method_taken_out_of_the_comparison_leaves_the_frames(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     server.patch("settings", {"view": {"compare": True}})
@@ -74,6 +76,7 @@ def test_method_taken_out_of_the_comparison_leaves_the_frames(visitor: Visitor) 
     assert server.get("settings")["view"]["methods"] == [name for name in METHODS if name != "wtls"]
 
 
+@pytest.mark.long
 def test_noise_is_entered_in_millimetres_and_degrees(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     page.get_by_role("spinbutton", name="Range in mm", exact=True).fill("35")
@@ -85,6 +88,7 @@ def test_noise_is_entered_in_millimetres_and_degrees(visitor: Visitor) -> None:
     assert noise["sigma_bearing"] == pytest.approx(math.radians(0.5))
 
 
+@pytest.mark.long
 def test_every_parameter_has_its_unit_and_goes_back_to_its_default(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     defaults = server.get("settings")["extraction"]
@@ -103,6 +107,7 @@ def test_every_parameter_has_its_unit_and_goes_back_to_its_default(visitor: Visi
     assert set(units) == {"mm", "m", "°", ""}
 
 
+@pytest.mark.long
 def test_slider_keeps_its_place_while_dragged(visitor: Visitor) -> None:
     """Others change settings meanwhile, and the echo of every step comes back: neither moves the slider."""
     server, page = visitor.server, visitor.page
@@ -127,6 +132,7 @@ def test_slider_keeps_its_place_while_dragged(visitor: Visitor) -> None:
     page.mouse.up()
 
 
+@pytest.mark.long
 def test_value_out_of_range_is_not_sent(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     before = server.get("settings")
@@ -144,6 +150,7 @@ def test_value_out_of_range_is_not_sent(visitor: Visitor) -> None:
     assert server.get("settings")["extraction"]["min_points"] == 9
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_layers_can_be_hidden(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
@@ -158,6 +165,7 @@ def test_layers_can_be_hidden(visitor: Visitor) -> None:
         wait_until(lambda before=before: drawn(visitor.picture()).sum() < before, "less is drawn")
 
 
+@pytest.mark.long
 def test_rejections_say_why_a_wall_is_missing(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     server.show(HOKUYO, 60)

@@ -32,6 +32,7 @@ def resting(page: Page) -> list[float]:
     return targets[-1]
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_another_source_is_fitted_in_the_view_and_charted_anew(visitor: Visitor) -> None:
     page, server = visitor.page, visitor.server

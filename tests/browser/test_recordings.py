@@ -60,6 +60,7 @@ def test_upload_is_stored_and_plays(golf: Visitor) -> None:
     expect(page.locator("#uploads li")).to_have_count(0)  # the progress bar is gone
 
 
+@pytest.mark.long
 def test_upload_shows_its_progress(visitor: Visitor) -> None:
     page = visitor.page
     slow = {"offline": False, "latency": 0, "downloadThroughput": -1, "uploadThroughput": 500_000}
@@ -75,6 +76,7 @@ def test_upload_shows_its_progress(visitor: Visitor) -> None:
     assert any("of 1.0\u2009MB" in figure for _, _, figure in seen)
 
 
+@pytest.mark.long
 def test_unreadable_upload_is_refused_and_what_played_goes_on(golf: Visitor) -> None:
     golf.tolerated.append("422")
     server, page = golf.server, golf.page
@@ -89,6 +91,7 @@ def test_unreadable_upload_is_refused_and_what_played_goes_on(golf: Visitor) -> 
     expect(message).to_have_count(0)
 
 
+@pytest.mark.long
 def test_name_that_is_taken_can_be_replaced(golf: Visitor) -> None:
     golf.tolerated.append("409")
     golf.page.get_by_label("Recording to upload").set_input_files(GOLF)
@@ -118,6 +121,7 @@ def test_transport_pauses_steps_seeks_and_plays_on(golf: Visitor) -> None:
     assert server.get("source")["speed"] == 5
 
 
+@pytest.mark.long
 def test_end_is_reached_without_loop_and_play_begins_again(golf: Visitor) -> None:
     server, page = golf.server, golf.page
     wait_until(lambda: server.get("source")["complete"], "all scans are read")
@@ -132,6 +136,7 @@ def test_end_is_reached_without_loop_and_play_begins_again(golf: Visitor) -> Non
     wait_until(lambda: 0 < server.get("frame")["source"]["index"] < 100, "it plays from the beginning")
 
 
+@pytest.mark.long
 def test_recording_can_be_left_and_deleted(golf: Visitor) -> None:
     server, page = golf.server, golf.page
     page.get_by_role("button", name="Emulator").click()
@@ -153,6 +158,7 @@ def test_recording_can_be_left_and_deleted(golf: Visitor) -> None:
     assert Path(download.value.path()).read_bytes() == GOLF.read_bytes()
 
 
+@pytest.mark.long
 def test_one_of_several_lidars_is_chosen(visitor: Visitor, tmp_path: Path) -> None:
     visitor.tolerated.append("409")
     page, path = visitor.page, write_two_lidars(tmp_path / "two_lidars.bag")

@@ -88,6 +88,7 @@ def shown(visitor: Visitor, table: str = "repeatability-table") -> list[list[str
     )
 
 
+@pytest.mark.long
 def test_while_it_is_off_there_is_nothing_but_the_switch(visitor: Visitor) -> None:
     visitor.server.api.delete("repeatability").raise_for_status()
     visitor.page.get_by_role("tab", name="Repeatability").click()
@@ -121,6 +122,7 @@ def set_noise(visitor: Visitor, sigma_range: float, sigma_bearing: float) -> Non
     visitor.server.patch("settings", {"extraction": {"noise": noise}})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sigmas", "verdict", "noise"),
     [((0.05, 0.01), "too large", "less"), ((0.001, 0.0001), "too small", "more")],
@@ -148,12 +150,14 @@ def test_where_all_are_wrong_the_way_to_calibration_stands_above_the_table(
     expect(hint).to_be_hidden()
 
 
+@pytest.mark.long
 def test_no_head_of_the_table_breaks_within_a_percentage(tab: Visitor) -> None:
     still(tab)
     for head in tab.page.locator("#repeatability-table th", has_text="in ").all():
         assert head.evaluate(LINES) == 1
 
 
+@pytest.mark.long
 def test_boxes_stand_where_the_areas_are_on_a_logarithmic_axis(tab: Visitor) -> None:
     told, page = still(tab), tab.page
     wanted, at = [], []
@@ -183,6 +187,7 @@ def test_boxes_stand_where_the_areas_are_on_a_logarithmic_axis(tab: Visitor) -> 
     assert page.locator(".boxes").get_attribute("aria-label").startswith("Median claimed ellipse area")
 
 
+@pytest.mark.long
 def test_dots_and_ellipses_of_a_corner_are_to_scale(tab: Visitor) -> None:
     told, page = still(tab), tab.page
     corners = {
@@ -219,6 +224,7 @@ def test_dots_and_ellipses_of_a_corner_are_to_scale(tab: Visitor) -> None:
         assert page.locator("#repeatability-scatter .scatter .claim").count() == 12
 
 
+@pytest.mark.long
 def test_the_corner_selected_is_the_one_shown(tab: Visitor) -> None:
     told, page = still(tab), tab.page
     frame = {corner["id"]: corner["by_method"]["ml"] for corner in tab.server.get("frame")["corners"]}
@@ -243,6 +249,7 @@ def test_the_corner_selected_is_the_one_shown(tab: Visitor) -> None:
     wait_until(lambda: tab.server.get("selection")["corner"] == last, "the corner is selected everywhere")
 
 
+@pytest.mark.long
 def test_it_begins_anew_by_hand_and_says_how_far_it_is(tab: Visitor) -> None:
     tab.tolerated.append("404")  # the corner whose sightings it asks for may have gone with the window
     page = tab.page
@@ -257,6 +264,7 @@ def test_it_begins_anew_by_hand_and_says_how_far_it_is(tab: Visitor) -> None:
     expect(page.locator("#repeatability-claims")).to_be_visible()
 
 
+@pytest.mark.long
 def test_it_asks_only_while_it_runs_and_is_looked_at(tab: Visitor) -> None:
     page, server = tab.page, tab.server
 
@@ -286,6 +294,7 @@ def test_it_asks_only_while_it_runs_and_is_looked_at(tab: Visitor) -> None:
     expect(page.locator("#repeatability-claims")).to_be_visible()  # what was found can still be read
 
 
+@pytest.mark.long
 def test_a_link_carries_that_it_runs(tab: Visitor, visit: Callable[..., Visitor]) -> None:
     tab.page.wait_for_url("**#*repeatability=true&window=20*")
     link = tab.page.url.partition("#")[2]
@@ -295,6 +304,7 @@ def test_a_link_carries_that_it_runs(tab: Visitor, visit: Callable[..., Visitor]
     wait_until(lambda: tab.server.get("settings")["repeatability"] == {"running": True, "window": 20})
 
 
+@pytest.mark.long
 def test_on_a_phone_nothing_is_cut_off(tab: Visitor) -> None:
     still(tab)
     tab.page.set_viewport_size({"width": 390, "height": 844})

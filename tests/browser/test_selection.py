@@ -56,6 +56,7 @@ def ids_by_x(visitor: Visitor) -> list[int]:
     return [c["id"] for c in sorted(frame["corners"], key=lambda c: c["by_method"][frame["fitter"]]["x"])]
 
 
+@pytest.mark.long
 def test_corners_are_six_pixels_across_at_every_zoom(still: Visitor) -> None:
     show(still, layers=NOTHING | {"corners": True})
     corner = ids_by_x(still)[0]
@@ -89,6 +90,7 @@ def test_six_methods_are_six_outlines_at_every_zoom(still: Visitor) -> None:
             assert alike.sum() >= 12, (name, steps)
 
 
+@pytest.mark.long
 def test_row_selected_in_the_table_is_ringed(still: Visitor) -> None:
     ids = ids_by_x(still)
     for id_ in (ids[0], ids[-1]):
@@ -113,6 +115,7 @@ def test_corner_clicked_over_the_scene_is_selected_in_the_table(still: Visitor) 
     wait_until(lambda: still.server.get("selection")["corner"] == id_, "the server knows")
 
 
+@pytest.mark.long
 def test_pointer_over_a_corner_says_what_it_is(still: Visitor) -> None:
     frame = still.server.get("frame")
     corner = frame["corners"][0]
@@ -134,6 +137,7 @@ def test_tap_on_a_phone_selects_and_the_legend_leaves_the_room_free(visit: Calla
     wait_until(lambda: phone.server.get("selection")["corner"] == id_, "it is selected")
 
 
+@pytest.mark.long
 def test_arrow_keys_walk_through_the_table(visitor: Visitor) -> None:
     page, server = visitor.page, visitor.server
     server.show(HOKUYO, 60)
@@ -146,6 +150,7 @@ def test_arrow_keys_walk_through_the_table(visitor: Visitor) -> None:
         expect(page.locator("#corner-table button:focus")).to_have_text(f"C{expected}")
 
 
+@pytest.mark.long
 def test_pointer_over_a_point_says_how_far_its_beam_went(still: Visitor) -> None:
     scan = still.server.get("frame?points=true")
     far = max(scan["points"], key=lambda xy: hypot(*xy))
@@ -156,6 +161,7 @@ def test_pointer_over_a_point_says_how_far_its_beam_went(still: Visitor) -> None
     assert away == pytest.approx(hypot(*far), abs=0.1)  # the next one within four pixels may be meant
 
 
+@pytest.mark.long
 def test_pointer_over_the_trail_says_when_the_sensor_was_there(visitor: Visitor) -> None:
     server = visitor.server
     server.patch("settings", {"navigation": {"mode": "slam"}, "view": {"layers": {"sensor": False}}})

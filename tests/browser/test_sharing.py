@@ -44,6 +44,7 @@ def test_link_restores_the_view_in_a_fresh_browser(server: Server, visit: Callab
     expect(second.page.get_by_role("spinbutton", name="Corner gap")).to_have_value("0.31")
 
 
+@pytest.mark.long
 def test_link_to_a_recording_that_is_gone_says_so(server: Server, visit: Callable[..., Visitor]) -> None:
     visitor = visit()
     visitor.tolerated.append("404")
@@ -61,6 +62,7 @@ def test_plain_address_leaves_what_others_set_up(server: Server, visit: Callable
     visitor.page.wait_for_url(re.compile(r"corner_gap=0\.3(&|$)"))
 
 
+@pytest.mark.long
 def test_theme_and_layers_belong_to_each_browser_until_they_are_set_for_all(
     server: Server, visit: Callable[..., Visitor]
 ) -> None:
@@ -80,6 +82,7 @@ def test_theme_and_layers_belong_to_each_browser_until_they_are_set_for_all(
         expect(visitor.page.get_by_role("checkbox", name="Points")).to_be_checked()
 
 
+@pytest.mark.long
 def test_reload_does_not_rewind_what_plays(server: Server, visit: Callable[..., Visitor]) -> None:
     visitor = visit().open()
     server.show(GOLF, 0)
@@ -93,6 +96,7 @@ def test_reload_does_not_rewind_what_plays(server: Server, visit: Callable[..., 
     assert server.get("source")["state"] == "playing"
 
 
+@pytest.mark.long
 def test_second_browser_sees_the_same(server: Server, visit: Callable[..., Visitor]) -> None:
     first, second = visit().open(), visit().open()
     first.page.get_by_label("Fitter").select_option("wctls")
@@ -121,6 +125,7 @@ def own_server(tmp_path: Path) -> Iterator[Server]:
     server.kill()
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_lost_connection_comes_back_by_itself(own_server: Server, visit: Callable[..., Visitor]) -> None:
     visitor = visit(at=own_server)
@@ -139,6 +144,7 @@ def test_lost_connection_comes_back_by_itself(own_server: Server, visit: Callabl
     wait_until(lambda: (visitor.picture() != picture).mean() > 0.001, "the scene moves again")
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_page_keeps_its_colours_and_says_what_became_of_the_recording_when_the_server_starts_anew(
     own_server: Server, visit: Callable[..., Visitor]

@@ -47,6 +47,7 @@ def run_short(visitor: Visitor) -> None:
     form.get_by_role("button", name="Run").click()
 
 
+@pytest.mark.long
 def test_a_study_is_run_and_its_report_read_in_the_page(studies: Callable[..., Visitor]) -> None:
     visitor = studies(1400, 900)
     page = visitor.page
@@ -100,6 +101,7 @@ def test_a_study_is_cancelled(studies: Callable[..., Visitor]) -> None:
     assert visitor.server.get("studies")["run"]["state"] == "cancelled"
 
 
+@pytest.mark.long
 def test_what_went_wrong_is_said_in_the_words_of_the_command(studies: Callable[..., Visitor]) -> None:
     """The demo's people walk about, but its sensor stands still, and a lidar of that name it has not."""
     visitor = studies()
@@ -128,6 +130,7 @@ def test_a_recording_is_told_the_noise_set_now_and_the_rooms_the_papers(
     expect(usual).to_be_checked()
 
 
+@pytest.mark.long
 def test_the_main_table_of_a_report_fits_beside_the_studies(
     studies: Callable[..., Visitor],
 ) -> None:
@@ -154,6 +157,7 @@ def test_the_keyboard_alone_starts_and_cancels(studies: Callable[..., Visitor]) 
     expect(page.locator("#run-state")).to_have_text(re.compile("^Cancelled"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("theme", ["light", "dark"])
 def test_the_page_and_its_report_are_as_light_or_dark_as_the_dashboard(
     studies: Callable[..., Visitor], theme: str
@@ -186,6 +190,7 @@ def test_every_control_of_the_page_has_a_name(studies: Callable[..., Visitor]) -
     assert [role for role, name in controls if not name.strip()] == []
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("size", [(390, 844), (768, 1024), (1000, 640), (1400, 900)])
 def test_the_head_of_the_dashboard_has_room_for_its_links(visit: Visit, size: tuple[int, int]) -> None:
     page = visit(*size).open().page

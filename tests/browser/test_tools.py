@@ -42,6 +42,7 @@ def robot(visit: Callable[..., Visitor]) -> Visitor:
     return visitor
 
 
+@pytest.mark.long
 def test_the_sensor_stays_in_the_middle_until_the_view_is_dragged(robot: Visitor) -> None:
     page = robot.page
     places: list[list[float]] = []
@@ -69,6 +70,7 @@ def test_the_sensor_stays_in_the_middle_until_the_view_is_dragged(robot: Visitor
     expect(button).to_have_attribute("aria-pressed", "false")
 
 
+@pytest.mark.long
 def test_the_heading_points_up_however_the_sensor_turns(robot: Visitor) -> None:
     headings: list[float] = []
 
@@ -85,6 +87,7 @@ def test_the_heading_points_up_however_the_sensor_turns(robot: Visitor) -> None:
     wait_until(is_up_at_another_heading, "the heading is up, whichever it is")
 
 
+@pytest.mark.long
 def test_without_a_pose_the_tools_say_so(visit: Callable[..., Visitor]) -> None:
     visitor = visit().open()
     visitor.page.get_by_role("button", name=MIDDLE).click()
@@ -93,6 +96,7 @@ def test_without_a_pose_the_tools_say_so(visit: Callable[..., Visitor]) -> None:
     wait_until(lambda: visitor.server.get("settings")["navigation"]["mode"] == "slam", "SLAM runs")
 
 
+@pytest.mark.long
 def test_points_of_the_last_scans_fade_out(visit: Callable[..., Visitor]) -> None:
     visitor = visit().open()
     server, page = visitor.server, visitor.page

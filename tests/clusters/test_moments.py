@@ -50,6 +50,7 @@ def test_the_share_of_the_noise_is_what_numeric_derivatives_give(noise):
     assert of_noise(Scan(ranges, bearings), noise, settings) == pytest.approx(total, rel=1e-6)
 
 
+@pytest.mark.long
 @noises
 @pytest.mark.parametrize("radius", [0.1, 0.3])
 def test_the_share_of_the_noise_holds_the_mean_as_often_as_it_says(noise, radius):
@@ -67,6 +68,7 @@ def test_the_share_of_the_noise_holds_the_mean_as_often_as_it_says(noise, radius
     assert binom.ppf(TAIL, trials, 0.95) <= held <= binom.ppf(1 - TAIL, trials, 0.95)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("spacing", [0.005, 0.02])
 def test_a_flat_object_of_any_width_is_where_it_is_within_the_spacing_of_the_beams(spacing):
     rng, trials = np.random.default_rng(23), 4000
@@ -82,6 +84,7 @@ def test_a_flat_object_of_any_width_is_where_it_is_within_the_spacing_of_the_bea
     assert found.covariances[0, 1, 1] == pytest.approx(spacing**2 / 24, rel=1e-3)
 
 
+@pytest.mark.long
 @noises
 def test_the_mean_of_a_post_met_by_other_beams_in_every_scan_is_where_its_covariance_says(noise):
     """Noise alone would claim too much: it holds the mean far less often."""

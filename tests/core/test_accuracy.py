@@ -135,6 +135,7 @@ def test_walls_and_corners_of_the_furnished_room_are_found(told, sigma, recall, 
         assert rms <= 0.009
 
 
+@pytest.mark.long
 @figures
 def test_the_library_s_own_measure_says_the_same(sigma, recall, precision):
     measured = measure_accuracy(sigma, SCANS, seed=815)

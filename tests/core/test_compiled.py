@@ -37,6 +37,7 @@ def run(folder: Path, source: str) -> tuple[float, int]:
     return float(value), int(hits)
 
 
+@pytest.mark.long
 def test_kept_code_is_used_until_a_kernel_that_it_calls_or_a_constant_changes(tmp_path: Path) -> None:
     assert run(tmp_path, CALLEE.format("+ 1", 10)) == (40.0, 0)
     assert run(tmp_path, CALLEE.format("+ 1", 10)) == (40.0, 1)

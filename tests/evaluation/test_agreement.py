@@ -69,6 +69,7 @@ def test_claims_that_are_too_small_are_caught():
     assert np.mean(d <= GATE) == pytest.approx(1 - 0.05**0.25, abs=0.09)
 
 
+@pytest.mark.long
 def test_the_systematic_part_is_found_and_mends_the_claims_of_walls_and_corners():
     """Its size follows from a coverage: of 600 differences to a tenth or so."""
     groups = [pairs(25, seed, tau=0.006) for seed in range(4)]
@@ -114,6 +115,7 @@ def test_looks_that_share_nothing_have_no_differences():
         assert len(found.walls) == len(found.corners) == 0
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_neighbouring_real_stations_agree_once_the_systematic_part_is_known(data, tmp_path):
     """It is told by one half of the pairs of stations and judged on the other; it only ever adds to what is claimed.

@@ -158,6 +158,7 @@ def test_a_noise_that_cannot_be_told_is_not_made_up():
     assert report(result).noise.sigma_bearing is None
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 @pytest.mark.parametrize("station", ["1", "2", "5"])
 def test_a_real_sensor_at_rest_has_more_noise_far_away(data, station):
@@ -285,6 +286,7 @@ def test_the_command_writes_json(data):
     assert json.loads(result.output) == json.loads(to_json(report(calibrate(scans))))
 
 
+@pytest.mark.long
 def test_words_say_what_cannot_be_told():
     """A narrow view of one wall; then a plain room, with and without a bias."""
     bearing, straight, bias, alignment = report(calibrate(narrow_view())).remarks

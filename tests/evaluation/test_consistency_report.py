@@ -57,6 +57,7 @@ def what(row: Row) -> str:
     return f"Every figure: {noise}; {'all rooms together' if row.room == 'all' else row.room}"
 
 
+@pytest.mark.long
 def test_every_figure_of_every_row_is_in_a_table(simulated: Consistency) -> None:
     report = html(simulated)
     tables = Tables(report).rows

@@ -54,6 +54,7 @@ def test_another_seed_gives_other_numbers(uninterrupted):
     assert not np.isclose(other.sums[..., 2], uninterrupted.sums[..., 2]).any()
 
 
+@pytest.mark.long
 def test_no_scheduler_there_is_said():
     with pytest.raises(EvaluationError, match=r"No Dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
         study(DESIGN, scheduler="tcp://127.0.0.1:9")
@@ -166,6 +167,7 @@ def test_what_is_wrong_with_the_command_is_said_at_once(options, said, monkeypat
     assert said in " ".join(capsys.readouterr().err.replace("│", " ").split())
 
 
+@pytest.mark.long
 def test_ctrl_c_ends_the_workers_too_and_writes_nothing(tmp_path):
     output = tmp_path / "study.json"
     arguments = [*COMMAND, "--trials", "400000", "--workers", "2", "--progress", "-o", str(output)]

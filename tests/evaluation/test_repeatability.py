@@ -120,6 +120,7 @@ def verdicts(corners, claim, studies, seed=0):
     return {word: words[word] / studies for word in ("true", "too small", "too large", "open")}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("corners", "believed"), [(1, 0.1), (5, 0.95), (10, 0.99)])
 def test_honest_ellipses_are_hardly_ever_called_wrong_and_believed_once_enough_is_seen(corners, believed):
     """Of one corner's hundred scans it is mostly open."""
@@ -128,6 +129,7 @@ def test_honest_ellipses_are_hardly_ever_called_wrong_and_believed_once_enough_i
     assert told["true"] >= believed, told
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("corners", [1, 3, 10])
 @pytest.mark.parametrize(("sigmas", "word"), [(1 / 1.5, "too small"), (1.5, "too large"), (7.6, "too large")])
 def test_ellipses_wrong_by_half_a_sigma_are_caught_even_of_one_corner(corners, sigmas, word):
@@ -159,6 +161,7 @@ def test_whole_intervals_decide_those_of_95_percent_before_those_of_50(in_95, in
     assert verdict(Judgement(half, half, most, most)) == word
 
 
+@pytest.mark.long
 def test_intervals_hold_the_truth_as_often_as_they_say():
     held, studies = np.zeros(4), 150
     single = []
@@ -237,6 +240,7 @@ def test_boxes_are_quartiles_of_each_scans_median_and_whiskers_end_at_a_value():
     assert box.outliers[-1] == pytest.approx(medians[7])
 
 
+@pytest.mark.long
 def test_a_sensor_at_rest_is_not_said_to_move():
     rng, study = np.random.default_rng(6), Repeatability(100, [METHOD])
     for _ in range(1500):

@@ -121,6 +121,7 @@ def test_a_factor_in_all_ranges_is_not_taken_for_a_bias():
     assert larger.contains(0.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("turn", np.radians([-44, -1, 0, 30, 46, 91, 179]))
 def test_alignment_is_known_up_to_quarter_turns(turn):
     pose = np.array([0.5, 0.3, -turn])
@@ -154,6 +155,7 @@ def stations(path) -> Iterator[list[Scan]]:
             yield scans
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_both_halves_of_real_stations_tell_the_same(data):
     """Nobody knows the bias of that sensor; but its halves share it, and the few short walls show little of it."""

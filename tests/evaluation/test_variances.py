@@ -83,6 +83,7 @@ def test_no_neighbour_of_what_is_found_in_a_real_room_is_likelier(data, name, co
     print([1e3 * sigma.value for sigma in bands.sigmas], 1e3 * bands.slope.value)
 
 
+@pytest.mark.long
 def test_a_general_optimiser_finds_nothing_better_however_badly_the_model_fits():
     rng = np.random.default_rng(1)
     for _ in range(20):

@@ -80,6 +80,7 @@ class Tables(HTMLParser):
             self._rows[-1][-1] += data
 
 
+@pytest.mark.long
 def test_the_tables_of_the_command_hold_the_numbers_of_the_library(
     report: str, result: ClusteringStudy
 ) -> None:

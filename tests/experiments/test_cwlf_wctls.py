@@ -76,6 +76,7 @@ def assert_complete(report: str, figures: tuple[int, ...]) -> None:
     assert not re.search(r"\bnan\b|\binf\b", report, re.IGNORECASE)
 
 
+@pytest.mark.long
 def test_the_tables_of_cwlf_hold_the_numbers_of_the_library(
     command: Command, of_cwlf: cwlf.CwlfStudy
 ) -> None:
@@ -221,6 +222,7 @@ GOLF_ROOM = "rplidar_csv_rooms/golf_room.csv.gz"
 ASSUMED = "Assumed, not measured: 50 mm of range noise (--sigma-range) and 3.49 mrad of bearing noise (--sigma-bearing)"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["cwlf", "wctls"])
 def test_a_real_recording_makes_a_report_of_nothing_else(command: Command, data: Path, name: str) -> None:
     options = ("--recording", str(data / GOLF_ROOM), "--scans", "60", "--workers", "1")
@@ -235,6 +237,7 @@ def test_a_real_recording_makes_a_report_of_nothing_else(command: Command, data:
     )
 
 
+@pytest.mark.long
 def test_of_noise_that_is_given_nothing_is_assumed(command: Command, data: Path) -> None:
     options = ("--recording", str(data / GOLF_ROOM), "--scans", "60", "--sigma-range", "0.04")
     before = re.escape("Assumed, not measured: 3.49 mrad of bearing noise (--sigma-bearing).") + ".*\n"

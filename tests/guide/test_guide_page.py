@@ -51,6 +51,7 @@ def numbers(page: str) -> list[tuple[dict[str, float], str]]:
     return [(attributes(given), text) for given, text in NUMBER.findall(page)]
 
 
+@pytest.mark.long
 def test_the_shipped_page_is_what_this_code_makes_but_for_numbers_and_drawings(
     shipped: str, remade: str
 ) -> None:

@@ -58,6 +58,7 @@ def map_and_localize(walk: Walk, rng: np.random.Generator) -> list[float]:
     return errors
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("run", [localize, map_and_localize])
 def test_the_covariance_is_what_the_errors_show(
     run: Callable[[Walk, np.random.Generator], list[float]],

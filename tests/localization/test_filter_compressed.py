@@ -182,6 +182,7 @@ def test_slam_does_the_same_whatever_part_of_the_map_is_active(monkeypatch: pyte
     np.testing.assert_allclose(few_active.landmarks.xy, all_active.landmarks.xy, atol=1e-9)
 
 
+@pytest.mark.long
 def test_the_covariance_stays_positive_definite_over_many_changes_of_the_active_part(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

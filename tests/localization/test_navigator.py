@@ -259,6 +259,7 @@ def test_a_sensor_noisier_than_told_is_believed_less() -> None:
     assert sizes[0] > 0.8 * sizes[1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("gap", [100, 300])
 def test_after_a_long_gap_the_pose_is_made_sure_of_before_anything_is_matched(gap: int) -> None:
     """In two rooms that look alike; seed 0, whose odometry is three of its sigmas off after ten seconds."""

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 CHECK = """
 import sys
 from itertools import islice
@@ -27,6 +29,7 @@ print(len([name for name, count in after.items() if count]))
 """
 
 
+@pytest.mark.long
 def test_nothing_is_left_to_compile_for_a_live_map() -> None:
     """In a process of its own, as other tests compile kernels, too."""
     done = subprocess.run([sys.executable, "-c", CHECK], capture_output=True, text=True, check=True)

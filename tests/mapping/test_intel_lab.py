@@ -16,6 +16,7 @@ from lidarcore.mapping import Mapper
 FOLDER = "intel_odometry_groundtruth"
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_the_map_of_the_intel_lab_agrees_with_corrected_poses_and_with_relations(data):
     """Odometry drifts by 61.8 m. GMapping's corrected poses have about 2 cm of their own."""

@@ -86,6 +86,7 @@ def test_the_live_pose_is_lost_while_nobody_knows_how_an_island_lies(data):
     assert states == 32 * ["tracking"] + 8 * ["lost"]
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_a_real_building_without_odometry_where_a_scan_fits_in_two_places(data):
     """In Freiburg's building 101 a scan after a break fits in two places, 6.8 m and half a turn from each other.

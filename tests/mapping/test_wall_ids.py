@@ -104,6 +104,7 @@ def around(seed: int) -> Drive:
     return Drive(on, set(pictures[-1][1].ids.tolist()), max(bent))
 
 
+@pytest.mark.long
 def test_walls_of_a_building_keep_their_ids_while_the_map_grows_and_loops_bend_it():
     """What is seen again before the loop closes is there twice, and becomes one with the older id."""
     drives = [around(seed) for seed in range(4)]

@@ -178,6 +178,7 @@ def test_a_damaged_capture_is_read_up_to_the_damage(tmp_path):
     assert "The capture is damaged or cut short: everything before is read." in recording.notes
 
 
+@pytest.mark.long
 def test_a_live_capture_holds_what_the_driver_gave(tmp_path):
     with (
         CaptureWriter(tmp_path / "a.rplidar") as capture,
@@ -194,6 +195,7 @@ def test_a_live_capture_holds_what_the_driver_gave(tmp_path):
         assert abs(scan.stamp - time.time()) < 60
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sensor", "wish", "name"),
     [({}, "Standard", "Standard"), ({"legacy_only": True}, None, "Standard"), ({}, None, "DenseBoost")],
@@ -223,6 +225,7 @@ def test_replayed_through_the_driver_a_capture_gives_what_it_gives_from_the_file
         np.testing.assert_allclose(scan.beam_times, seen.beam_times, atol=1e-6)
 
 
+@pytest.mark.long
 def test_a_capture_begun_amid_another_mode_than_the_usual_is_replayed_in_it(tmp_path):
     """As the recorder writes it when it is started later than the sensor."""
     nodes = np.arange(4000) * 360 * 10 * 244e-6 % 360

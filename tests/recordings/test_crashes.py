@@ -77,6 +77,7 @@ def kill_and_check(path, delay):
     assert_holds(path, [stamp for stamp in stamps if stamp < killed - 1 - BUSY])
 
 
+@pytest.mark.long
 def test_killed_at_any_moment_at_most_the_last_second_is_missing(tmp_path):
     moments = random.Random(3)
     for batch in range(2):
@@ -97,6 +98,7 @@ def test_killed_at_any_moment_at_most_the_last_second_is_missing(tmp_path):
         assert not failures
 
 
+@pytest.mark.long
 def test_killed_while_the_sensor_is_silent_nothing_is_missing(tmp_path):
     with recording(tmp_path / "a.mcap", "stalling") as (process, stamps):
         wait_until(lambda: len(stamps) >= 3)

@@ -25,6 +25,7 @@ def assert_is_turned(scan, angles, distances, quality=None):
         np.testing.assert_array_equal(sorted(scan.quality), sorted(quality))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "revolutions"), [("nut_room", 1498), ("nut_behind_obj", 361), ("golf_room", 947)]
 )
@@ -44,6 +45,7 @@ def test_csv_revolutions_are_those_of_the_flags(data, name, revolutions):
         assert_is_turned(scan, part["angle"], part["distance"], quality)
 
 
+@pytest.mark.long
 def test_revolutions_at_stations_are_told_apart(data):
     rows = table(data / ROOMS / "mapping_keng.csv.gz")
     keys = rows["station"] * 1000 + rows["rev"]

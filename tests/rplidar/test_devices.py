@@ -62,6 +62,7 @@ def test_what_looks_like_a_sensor_is_asked_who_it_is(sensor: EmulatorProcess) ->
     assert (found.error, found.in_use) == (None, False)
 
 
+@pytest.mark.long
 def test_a_sensor_at_another_baud_rate_is_found() -> None:
     with EmulatorProcess(baud=115_200) as sensor:
         (found,) = find_devices(list_ports=lambda: [usb(sensor.port)])
@@ -69,6 +70,7 @@ def test_a_sensor_at_another_baud_rate_is_found() -> None:
     assert found.baud == 115_200
 
 
+@pytest.mark.long
 def test_other_adapters_are_listed_and_left_alone() -> None:
     with EmulatorProcess(streaming=True) as sensor, Serial() as line:
         (found,) = find_devices(list_ports=lambda: [usb(sensor.port, FTDI)])
@@ -105,6 +107,7 @@ def test_of_several_the_one_that_answers_is_taken(sensor: EmulatorProcess, silen
     assert only_device(lambda: [usb(silent), usb(sensor.port)]) == sensor.port
 
 
+@pytest.mark.long
 def test_of_several_sensors_one_must_be_chosen(sensor: EmulatorProcess) -> None:
     with EmulatorProcess() as other:
         with pytest.raises(NoDeviceError, match="Several RPLIDARs") as raised:
@@ -132,6 +135,7 @@ def test_the_command_lists_every_port_and_says_what_to_do_without_a_sensor() -> 
     assert (ADVICE in shown.output) == (not any(device["looks_like"] for device in listed))
 
 
+@pytest.mark.long
 def test_the_command_names_sensors_and_faults(sensor: EmulatorProcess, silent: str) -> None:
     found = find_devices(list_ports=lambda: [usb(sensor.port), usb(silent), usb("/dev/other", FTDI)])
     lines = {device.path: sensor_at(device) for device in found}

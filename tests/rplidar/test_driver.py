@@ -182,6 +182,7 @@ print('mine')
     assert program.stopped_the_motor()
 
 
+@pytest.mark.long
 def test_a_sensor_left_streaming_is_taken_over_a_hundred_times_of_a_hundred() -> None:
     def take_over(first: int) -> int:
         with EmulatorProcess(spin_up=0, seed=first) as sensor:
@@ -230,6 +231,7 @@ def test_wishes_that_cannot_be_met_are_refused() -> None:
     check_wishes("standard", 480)
 
 
+@pytest.mark.long
 def test_the_right_baud_rate_is_named_where_the_wrong_one_was_given(sensor: EmulatorProcess) -> None:
     with pytest.raises(NoAnswerError, match="talks at 256000 baud, not at 115200"):
         Driver(sensor.port, baud=115_200).__enter__()

@@ -146,6 +146,7 @@ def test_a_sensor_that_stays_silent_is_started_again(sensor: EmulatorProcess) ->
         assert driver.statistics.reconnects == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("option", ["legacy_only", "silent_conf"])
 def test_a_sensor_that_does_not_tell_its_modes_scans_as_the_first_ones_did(option: str) -> None:
     with EmulatorProcess(spin_up=0, **{option: True}) as sensor, Driver(sensor.port) as driver:
@@ -153,6 +154,7 @@ def test_a_sensor_that_does_not_tell_its_modes_scans_as_the_first_ones_did(optio
         assert 380 < len(next(iter(driver))) < 430
 
 
+@pytest.mark.long
 def test_a_protection_stop_is_reset(sensor: EmulatorProcess) -> None:
     sensor.command("health 2 17")
     with Watched(sensor.port) as driver:
@@ -171,12 +173,14 @@ def test_a_protection_stop_that_stays_is_told_with_its_code() -> None:
         Driver(sensor.port).__enter__()
 
 
+@pytest.mark.long
 def test_a_warning_is_told_and_no_reason_to_stop() -> None:
     with EmulatorProcess(health=1, health_code=3, spin_up=0) as sensor, Driver(sensor.port) as driver:
         assert (driver.health.name, driver.health.code) == ("warning", 3)
         next(iter(driver))
 
 
+@pytest.mark.long
 def test_something_else_that_talks_is_no_sensor() -> None:
     with Other(b"$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n") as gps:
         start = time.monotonic()

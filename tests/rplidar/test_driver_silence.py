@@ -15,6 +15,7 @@ from lidarcore.rplidar import Driver
 from lidarcore.rplidar.protocol import Command, RequestReader
 
 
+@pytest.mark.long
 def test_silence_is_told_in_bounded_time() -> None:
     ends = os.openpty()
     start = time.monotonic()
@@ -25,6 +26,7 @@ def test_silence_is_told_in_bounded_time() -> None:
         os.close(end)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stops", [1, 8], ids=["asking", "trying other baud rates"])
 def test_closing_ends_connecting_to_silence(stops: int) -> None:
     far, near = os.openpty()

@@ -48,6 +48,7 @@ def pace(late, period):
     return period + (late[last] - late[first]) / (last - first)
 
 
+@pytest.mark.long
 def test_capsules_come_at_the_pace_of_an_s1_and_cost_little(emulator, line):
     line.scan()
     line.capsules(20)
@@ -186,6 +187,7 @@ def test_replugged_it_answers_at_the_same_path_as_just_switched_on(emulator, lin
             assert again.capsules(3)[1].tolist() == [True, False, False]
 
 
+@pytest.mark.long
 def test_plugged_in_again_it_may_have_to_boot():
     with EmulatorProcess(boot=0.5) as emulator:
         begin = time.monotonic()

@@ -49,6 +49,7 @@ def test_it_takes_options_and_gives_the_port_at_the_path_asked_for(tmp_path):
             emulator.command("unplug")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("options", [{}, {"link": "lidar"}], ids=["own folder", "link"])
 def test_killed_it_leaves_no_port_no_folder_and_no_zombie(tmp_path, options):
     link = {name: tmp_path / path for name, path in options.items()}
@@ -63,6 +64,7 @@ def test_killed_it_leaves_no_port_no_folder_and_no_zombie(tmp_path, options):
             emulator.command("unplug")
 
 
+@pytest.mark.long
 def test_its_end_is_told_once_and_only_if_it_was_not_asked_for():
     ends, ended = [], threading.Event()
 
@@ -125,6 +127,7 @@ def test_a_wrong_option_is_explained_on_the_command_line(capsys):
     assert "--rpm fast: Input should be a valid integer" in complaint
 
 
+@pytest.mark.long
 def test_it_ends_when_its_parent_is_killed():
     parent = subprocess.Popen([sys.executable, "-c", PARENT], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     pid, port = parent.stdout.readline().decode().split()
@@ -135,6 +138,7 @@ def test_it_ends_when_its_parent_is_killed():
     assert not Path(port).parent.exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("end", [signal.SIGTERM, signal.SIGINT])
 def test_a_signal_ends_it_and_leaves_nothing_behind(end):
     process, port = start([], stdin=subprocess.PIPE)
@@ -144,6 +148,7 @@ def test_a_signal_ends_it_and_leaves_nothing_behind(end):
     assert not Path(port).parent.exists()
 
 
+@pytest.mark.long
 def test_without_anyone_to_give_commands_it_goes_on():
     process, port = start(["--streaming"], stdin=subprocess.DEVNULL)
     with process:
@@ -153,6 +158,7 @@ def test_without_anyone_to_give_commands_it_goes_on():
         process.terminate()
 
 
+@pytest.mark.long
 def test_it_obeys_lines_in_pieces_and_quits_when_told():
     process, _ = start([], stdin=subprocess.PIPE)
     with process:

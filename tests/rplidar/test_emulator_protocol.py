@@ -173,6 +173,7 @@ def test_the_pwm_of_another_model_is_swallowed(line):
     assert line.capsules(30)[0].all()
 
 
+@pytest.mark.long
 def test_samples_wait_for_a_stable_motor_but_a_forced_scan_does_not():
     with EmulatorProcess(spin_up=2, people=0) as emulator:
         with line_to(emulator) as line:
@@ -237,6 +238,7 @@ def test_an_old_model_knows_the_legacy_scan_only():
         assert nodes(line.read(500))[3].all()
 
 
+@pytest.mark.long
 def test_configuration_may_stay_unanswered():
     with EmulatorProcess(silent_conf=True, spin_up=0.05) as emulator, line_to(emulator) as line:
         line.send(conf(0x7C))
@@ -245,6 +247,7 @@ def test_configuration_may_stay_unanswered():
         assert line.capsules(5)[0].all()
 
 
+@pytest.mark.long
 def test_another_baud_rate_hears_garbage_and_is_not_heard():
     with EmulatorProcess(streaming=True, spin_up=0.05) as emulator:
         with line_to(emulator, 115200) as line:

@@ -53,6 +53,7 @@ def test_the_same_seed_gives_the_same_measurements():
     assert seen[0] != seen[2]
 
 
+@pytest.mark.long
 def test_a_sensor_that_moves_follows_its_path():
     with EmulatorProcess(**EXACT, moving=True, spin_up=0) as emulator, line_to(emulator) as line:
         line.scan()
@@ -80,6 +81,7 @@ def capture(path, conversation, stream=None):
             file.write(direction, 1e9 + k * APART, data)
 
 
+@pytest.mark.long
 def test_a_capture_is_answered_and_sent_as_it_was_captured(tmp_path):
     info = bytes.fromhex("a55a1400000004" + "61090212" + 16 * "ab")
     asked = [("out", bytes.fromhex(ASK_INFO)), ("in", info[:9]), ("in", info[9:])]

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import capsule_streams as cs
 import numpy as np
+import pytest
 import rplidar
 import serial
 
@@ -101,6 +102,7 @@ def test_slamtecs_sdk_and_our_decoder_agree_node_for_node(tmp_path):
     assert nodes > 0.95 * REVOLUTIONS * 926
 
 
+@pytest.mark.long
 def test_roboticias_driver_and_our_decoder_agree_in_legacy_mode(monkeypatch):
     for name in ("setDTR", "dtr"):  # no pseudo-terminal has this line
         monkeypatch.setattr(serial.Serial, name, lambda self, on: None, raising=True)

@@ -136,6 +136,7 @@ def creeping(answer: int, dice: np.random.Generator) -> bytes:
     return b"".join(made)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("nonsense", [randomly, almost_rightly, standing_still, creeping, never_starting])
 @pytest.mark.parametrize("answer", [0x81, 0x85], ids=lambda answer: Answer(answer).name.lower())
 @pytest.mark.parametrize("pause", [0.0, 1e9], ids=["", "after a leap of the clock"])

@@ -145,6 +145,7 @@ def test_a_damaged_capsule_at_the_front_does_not_merge_turns() -> None:
     assert not any(r.complete for r in revolutions)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rpm", [480, 600, 900, *(60 / (n * 4.32e-3) for n in (16, 19, 24, 28))])
 def test_lost_turns_are_not_made_up_of_their_neighbours(rpm: float) -> None:
     """Where a turn is a whole number of capsules, the angle does not tell that they are lost: the time does."""

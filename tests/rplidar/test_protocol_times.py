@@ -47,6 +47,7 @@ def assert_each_turn_comes_once(revolutions, source: cs.Stream, sent) -> None:
     assert all(np.ptp(source.angles[cs.numbers(r)]) < 360 + 1 / 32 for r in revolutions)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rpm", [480, 540, 600, 700, 900, *WHOLE])
 def test_times_are_right_however_many_capsules_are_lost_in_a_row(rpm: float) -> None:
     """Nearly whole turns, too, where the next angle is closer than any loss of a few would make it."""

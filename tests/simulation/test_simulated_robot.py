@@ -80,6 +80,7 @@ def test_the_sensor_sees_what_it_is_said_to() -> None:
     assert len(scans(1)[0]) == 920
 
 
+@pytest.mark.long
 def test_odometry_errs_as_stated() -> None:
     """Each increment's error over its standard deviation is standard normal and independent: 5,000 of them."""
     found = scans(5001, world="corridor", field_of_view=NARROW, odometry=OdometryError(noise=ERROR), seed=3)
@@ -105,6 +106,7 @@ def test_odometry_errs_as_stated() -> None:
         assert low < (part**2).mean() < high
 
 
+@pytest.mark.long
 def test_errors_over_twenty_metres_are_those_of_a_random_walk() -> None:
     """Along and heading at the end of a straight line, over 60 drives, against the closed form."""
     ends = []
@@ -149,6 +151,7 @@ def test_another_error_of_the_odometry_leaves_the_ranges_as_they_are() -> None:
     assert not np.allclose(a.odometry, b.odometry)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", WORLDS)
 def test_people_walk_in_every_world(name: str) -> None:
     quiet = {"world": name, "path": next(iter(WORLDS[name].paths)), **EXACT}

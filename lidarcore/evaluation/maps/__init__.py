@@ -1,6 +1,6 @@
-"""Maps against their truth: poses, walls, relocation.
+"""Maps against their truth: poses and what they claim, walls, relocation.
 
 What is public are these modules; each is imported on demand.
 """
 
-__all__ = ["accuracy", "relocation", "study", "walls"]
+__all__ = ["accuracy", "honesty", "relocation", "study", "walls"]

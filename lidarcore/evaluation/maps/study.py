@@ -2,7 +2,7 @@
 
 import resource
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,11 +18,12 @@ from lidarcore.evaluation.maps.accuracy import (
     with_poor_odometry,
 )
 from lidarcore.geometry import pose_difference, relative, relative_jacobians, squared_mahalanobis
-from lidarcore.mapping import Mapper, MapperSettings
+from lidarcore.mapping import Loop, Mapper, MapperSettings
+from lidarcore.mapping.grid.occupancy import Mask
 from lidarcore.scan import Scan
 
 ODOMETRY = ("auto", "recorded", "poor", "none")
-_WRONG, _WRONG_TURN = 0.5, 0.2  # m and rad by which a loop that was believed is wrong
+_WRONG, _WRONG_TURN = 0.5, 0.2  # m and rad by which a pose, or a loop that was believed, is wrong
 _SAMPLE = 500  # pairs of keyframes whose joint covariance is computed
 
 
@@ -99,7 +100,7 @@ def study(
     if reference is not None:
         pairs = _lengths(relative_errors(poses, reference, close_pairs(reference)))
         normalised, allowed = _normalised(mapper, reference[numbers], own)
-        wrong = _wrong(mapper, reference[numbers])
+        wrong = wrong_loops(mapper.loops, reference[numbers])
     found = np.empty((0, 3)) if relations is None else relation_errors(relations, stamps, poses)
     return MapStudy(
         len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, megabytes,
@@ -126,8 +127,15 @@ def _normalised(mapper: Mapper, reference: Array, own: tuple[float, float]) -> t
     return table[:, 0], table[:, 1]
 
 
-def _wrong(mapper: Mapper, reference: Array) -> int:
-    ends = np.array([(loop.i, loop.j) for loop in mapper.loops], np.int64).reshape(-1, 2)
-    said = np.array([loop.pose for loop in mapper.loops]).reshape(-1, 3)
-    off = pose_difference(said, relative(reference[ends[:, 0]], reference[ends[:, 1]]))
-    return int(((np.hypot(off[:, 0], off[:, 1]) > _WRONG) | (np.abs(off[:, 2]) > _WRONG_TURN)).sum())
+def wrong_loops(loops: Sequence[Loop], reference: Array) -> int:
+    """How many loops tie keyframes, which truly were at reference (K, 3), more than 0.5 m or 0.2 rad wrongly."""
+    ends = np.array([(loop.i, loop.j) for loop in loops], np.int64).reshape(-1, 2)
+    said = np.array([loop.pose for loop in loops]).reshape(-1, 3)
+    return int(wrong_poses(said, relative(reference[ends[:, 0]], reference[ends[:, 1]])).sum())
+
+
+def wrong_poses(poses: Array, reference: Array) -> Mask:
+    """Which poses (N, 3) are more than 0.5 m or 0.2 rad off."""
+    off = pose_difference(poses, reference)
+    wrong: Mask = (np.hypot(off[:, 0], off[:, 1]) > _WRONG) | (np.abs(off[:, 2]) > _WRONG_TURN)
+    return wrong
