@@ -7,6 +7,8 @@ private parts, so the version is pinned and tests/app/test_viser_mount.py fails 
   stands for a server that keeps the connection handler and opens no socket.
 - The handler needs `subprotocol`, `send`, `recv` and `close` of a connection: `_Connection` is one, around a
   Starlette WebSocket.
+- What is drawn is told to waiting connections by an `asyncio.Event` that other threads set, which asyncio forbids:
+  now and then drawing fails with "deque mutated during iteration". `_LoopEvent` takes its place.
 - viser does not check what browsers send. Only where they look from is let in, which shuts the share tunnel,
   uploads into memory and changes of the shared panels.
 """
@@ -49,6 +51,9 @@ class ViserMount:
         with _quiet(), _no_socket() as handlers:
             self.server = viser.ViserServer(host="127.0.0.1", verbose=False)
         (self._handler,) = handlers
+        self.server._websock_server.get_message_buffer().message_event = _LoopEvent(
+            self.server.get_event_loop()
+        )
 
     def install(self, app: FastAPI) -> None:
         """Serve the client at /viser/ and its WebSocket at /viser, where the client looks for it."""
@@ -78,6 +83,22 @@ class ViserMount:
             logger.warning("viser gave up a client: %r", error)
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):  # it may be gone
                 await websocket.close(1007)
+
+
+class _LoopEvent(asyncio.Event):
+    """Is set by its loop only: viser also asks the loop to set it, each time it sets it from another thread."""
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._own_loop = loop
+
+    def set(self) -> None:
+        try:
+            here = asyncio.get_running_loop()
+        except RuntimeError:  # none runs in this thread
+            return
+        if here is self._own_loop:
+            super().set()
 
 
 @contextlib.contextmanager

@@ -14,6 +14,7 @@ import psutil
 import pytest
 import viser
 import zstandard
+from lidarcore_app.web.viser_mount import ViserMount
 from serving import CORNERS, Json, Server, wait_until
 from starlette.websockets import WebSocketDisconnect
 from waiting import PATIENCE
@@ -236,6 +237,25 @@ def test_the_client_page_is_ours_first_and_calls_nobody(server: Server) -> None:
     assert httpx.get(f"{server.url}/static/viser_bridge.js").status_code == 200
     assert httpx.get(f"{server.url}/viser").status_code == 307
     assert len(html) > 500_000
+
+
+def test_what_is_drawn_wakes_connections_on_their_own_event_loop() -> None:
+    """asyncio itself says so: in debug mode its loops refuse what another thread does to those who wait."""
+    mount = ViserMount()
+    try:
+        loop, buffer = mount.server.get_event_loop(), mount.server._websock_server.get_message_buffer()
+
+        async def debug_from_now_on() -> None:
+            loop.set_debug(True)
+            buffer.message_event.clear()
+
+        asyncio.run_coroutine_threadsafe(debug_from_now_on(), loop).result(PATIENCE)
+        woken = asyncio.run_coroutine_threadsafe(buffer.message_event.wait(), loop)
+        wait_until(lambda: buffer.message_event._waiters, "a connection waits")
+        mount.server.scene.world_axes.visible = True
+        assert woken.result(PATIENCE)
+    finally:
+        mount.close()
 
 
 def test_viewers_come_and_go_without_a_trace(server: Server) -> None:
