@@ -9,6 +9,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import to_json
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.routing import Match
 
@@ -116,6 +117,7 @@ def install(app: FastAPI) -> None:
     handle(RequestValidationError, _invalid)
     handle(ValidationError, _invalid)
     handle(LidarError, _problem)
+    handle(ClientDisconnect, lambda e: ProblemError(400, "The connection broke off before all was sent."))
     handle(Exception, lambda e: ProblemError(500, "The server failed to answer this; see its log."))
 
 

@@ -3,7 +3,7 @@
 import asyncio
 import socket
 from asyncio.transports import BaseTransport, WriteTransport
-from typing import ClassVar, cast
+from typing import Any, ClassVar, cast
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -72,6 +72,12 @@ class PromptWebSockets(WebSocketsSansIOProtocol):
         # Not of plain HTTP: a large answer would wait again and again for a client that acknowledges late.
         transport.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER)
         super().connection_made(transport)
+
+    async def send(self, message: Any) -> None:
+        """uvicorn does not take a refusal for an answer to the handshake, and would log an error for each."""
+        await super().send(message)
+        if message["type"] == "websocket.http.response.body" and not message.get("more_body"):
+            self.handshake_complete = True
 
 
 def allow_many_files() -> None:

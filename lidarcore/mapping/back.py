@@ -12,10 +12,12 @@ from lidarcore.mapping.front import Tracked
 from lidarcore.mapping.islands import Islands, moved
 from lidarcore.mapping.keyframes import Keyframe
 from lidarcore.mapping.loops import LoopFinder
+from lidarcore.mapping.patches import patches
 from lidarcore.mapping.pose_graph import PoseGraph
 from lidarcore.mapping.refinement import Refined, Step, refine
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.sight import sight
+from lidarcore.mapping.sweep import without
 
 _AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map
 _FOUND = np.diag([0.05, 0.05, 0.02]) ** 2  # how well it is known where an island was found
@@ -79,6 +81,14 @@ class BackEnd:
         again = sum(self._join(node) for node in range(1, len(self.graph)))
         again += sum(self._close(self._finder.find(node)) for node in range(1, len(self.graph)))
         return again + self._close(self._finder.conclude())
+
+    def renew(self, node: int, velocity: Array, sweep: Array) -> None:
+        """Take a velocity (3,) more out of a keyframe's scan, which then stands where it should within sweep (3, 3)."""
+        keyframe = self.keyframes[node]
+        scan = without(keyframe.scan, velocity)
+        if scan is not keyframe.scan:
+            seen = patches(scan, self._settings.front.match)
+            self.keyframes[node] = Keyframe(scan, seen, sight(scan), sweep)
 
     def refine(self) -> Refined:
         """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""

@@ -6,7 +6,7 @@ from types import TracebackType
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import UncertainPose, compose, inverse
+from lidarcore.geometry import UncertainPose, compose, inverse, relative
 from lidarcore.mapping.back import BackEnd, Snapshot
 from lidarcore.mapping.consistency import Loop
 from lidarcore.mapping.front import FrontEnd, Tracked
@@ -14,6 +14,7 @@ from lidarcore.mapping.keyframes import Keyframes
 from lidarcore.mapping.pose_graph import PoseGraph
 from lidarcore.mapping.refinement import Refined
 from lidarcore.mapping.settings import MapperSettings
+from lidarcore.mapping.settling import Taken, half_time, settled
 from lidarcore.mapping.worker import Worker
 from lidarcore.scan import Scan
 
@@ -60,6 +61,7 @@ class Mapper:
         self._worker = Worker(self._add, "mapper") if background else None
         self._stamps: list[float] = []
         self._ties: list[tuple[int, UncertainPose]] = []
+        self._taken: list[Taken] = []
         self._numbers: list[int] = []
         self._locals: list[Array] = []  # T_local_keyframe, in the front end's frame
         self._loops = 0
@@ -93,6 +95,9 @@ class Mapper:
                 self._back.add(tracked)
             else:
                 self._worker.put(tracked)
+        if tracked.first is not None:
+            self._taken[0] = _taken(tracked.first)
+        self._taken.append(_taken(tracked))
         self._stamps.append(tracked.stamp)
         self._ties.append(tie)
         snapshot = self._back.snapshot
@@ -107,10 +112,26 @@ class Mapper:
         if self._worker is not None:
             self._worker.join()
         with self._back.lock:
+            self._settle()
             if self._back.search_again():
                 self._back.search_again()
             self._refined = self._back.refine()
         self._loops = len(self._back.loops)
+
+    def _settle(self) -> None:
+        """Take out of the scans the motion that all of them show; what hangs on keyframes moves with them."""
+        nodes = np.array([node for node, _ in self._ties], np.int64)
+        at = compose(np.array(self._locals)[nodes], np.array([tie.pose for _, tie in self._ties]))
+        at, after = settled(np.array(self._stamps), at, self._taken)
+        for node, number in enumerate(self._numbers):
+            old, new = self._taken[number], after[number]
+            self._back.renew(node, new.velocity - old.velocity, new.sweep)
+            self._locals[node] = at[number]
+        for number, (node, tie) in enumerate(self._ties):
+            if number != self._numbers[node]:
+                P = tie.covariance - self._taken[number].sweep + after[number].sweep
+                self._ties[number] = node, UncertainPose(relative(self._locals[node], at[number]), P)
+        self._taken = after
 
     @property
     def loops(self) -> tuple[Loop, ...]:
@@ -170,3 +191,8 @@ class Mapper:
         """T_map_local (3,) by the newest keyframe that has reached the map."""
         known = len(snapshot.poses)
         return compose(snapshot.poses[-1], inverse(self._locals[known - 1])) if known else np.zeros(3)
+
+
+def _taken(tracked: Tracked) -> Taken:
+    laid = np.diagonal(tracked.tie.covariance - tracked.sweep)
+    return Taken(half_time(tracked.scan), tracked.velocity, laid, tracked.sweep, tracked.on)

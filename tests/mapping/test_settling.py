@@ -1,0 +1,85 @@
+"""The motion within each scan, told by where the scans around it were taken, against motions that are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lidarcore import SensorNoise
+from lidarcore.evaluation.maps.honesty import drive
+from lidarcore.geometry import compose, pose_difference, relative
+from lidarcore.mapping import Mapper, MapperSettings
+from lidarcore.mapping.settling import Taken, settled
+
+HALF = 0.05  # s
+T = np.arange(40) / 10
+
+
+def way(t):
+    """Poses (T, 3) of a sensor whose turn rate swings by 0.6 rad/s and whose speed by 0.3 m/s."""
+    fine = np.linspace(0, 5, 50_001)
+    speed, rate = 0.6 + 0.3 * np.sin(1.5 * fine), 0.6 * np.sin(2 * fine)
+    heading = np.cumsum(rate) * 1e-4
+    x, y = np.cumsum(speed * np.cos(heading)) * 1e-4, np.cumsum(speed * np.sin(heading)) * 1e-4
+    return np.stack([np.interp(t, fine, column) for column in (x, y, heading)], -1)
+
+
+def velocities(t):
+    """(T, 3) in the middle of the scan, seen from there."""
+    return relative(way(t + HALF - 1e-3), way(t + HALF + 1e-3)) / 2e-3
+
+
+def taken(removed):
+    return [Taken(HALF, v, np.full(3, 1e-8), np.eye(3), True) for v in removed]
+
+
+def test_speeds_and_places_are_found_though_each_scan_was_laid_with_the_speed_before_it():
+    removed = np.concatenate([np.zeros((1, 3)), velocities(T)[:-1]])
+    laid = compose(way(T), HALF * (velocities(T) - removed))
+    assert np.abs(pose_difference(laid, way(T))).max() > 0.005
+    at, after = settled(T, laid, taken(removed))
+    found = np.array([one.velocity for one in after])
+    assert np.abs(found - velocities(T))[2:-2].max() < 0.02
+    assert np.abs(pose_difference(at, way(T)))[2:-2].max() < 1e-3
+    claimed = np.array([np.sqrt(np.diag(one.sweep)) for one in after])
+    off = HALF * (found - velocities(T))
+    assert (np.abs(off)[:, [0, 2]] < 3 * claimed[:, [0, 2]]).all()
+
+
+def test_scans_that_lie_on_nothing_and_those_taken_at_once_stay_as_they_were():
+    given = taken(velocities(T))
+    given[7] = given[7]._replace(on=False)
+    given[20] = given[20]._replace(half=0.0)
+    laid = way(T)
+    laid[7] += [0.3, 0, 0]
+    at, after = settled(T, laid, given)
+    for k in (7, 20):
+        assert after[k] is given[k]
+        np.testing.assert_allclose(at[k], laid[k], atol=1e-12)
+    assert np.abs(pose_difference(at, way(T)))[[5, 6, 8, 9]].max() < 3e-3
+    alone, kept = settled(T[:1], laid[:1], given[:1])
+    assert kept[0] is given[0]
+    np.testing.assert_array_equal(alone, laid[:1])
+
+
+@pytest.mark.parametrize("odometry", [True, False])
+def test_a_robot_that_swings_into_a_turn_is_where_the_finished_map_says(odometry):
+    """Its turn rate grows by up to 2 rad/s²: by the motion before each scan alone, headings were 3 mrad off."""
+    scans = drive("two rooms", 6, seed=4)
+    mapper = Mapper(MapperSettings().with_noise(SensorNoise(0.01, 0.001)))
+    for scan in scans:
+        mapper.step(scan if odometry else replace(scan, odometry=None))
+    mapper.finish()
+    true = np.array([scans[k].truth for k in mapper.keyframes.numbers])
+    off = np.array(
+        [
+            pose_difference(mapper.relative(k, k + 1).pose, relative(true[k], true[k + 1]))
+            for k in range(1, len(true) - 2)
+        ]
+    )
+    assert len(off) > 8
+    print(np.sqrt(np.mean(off**2, axis=0)))
+    assert np.sqrt(np.mean(off[:, 2] ** 2)) < 0.0025
+    settled_once = mapper.trajectory()[1]
+    mapper.finish()
+    np.testing.assert_allclose(mapper.trajectory()[1], settled_once, atol=2e-3)
