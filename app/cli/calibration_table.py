@@ -70,7 +70,7 @@ def remarks(study: CalibrationStudy) -> Iterator[str]:
     for name, reason in WITHOUT.items():
         yield f"Not judged: {name} ({reason})."
     for failure in sorted(set(study.failures)):
-        yield f"{study.failures.count(failure)} rooms could not be calibrated: {failure}"
+        yield f"Not calibrated: {study.failures.count(failure)} of {study.design.rooms} rooms. {failure}"
     sizes = [part.error for part in study.parts() if part.name == "unevenness" and part.error is not None]
     for median, most in sizes:
         yield (

@@ -7,9 +7,13 @@ from lidarcore_app.cli.main import cli
 from typer.testing import CliRunner
 
 from lidarcore import SensorNoise, extract
+from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.calibration.true_walls import held
+from lidarcore.evaluation.calibration.unevenness import Profile, unevenness
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
+from lidarcore.simulation.rooms import rectangular_room
+from lidarcore.simulation.surface import Surface
 
 NOISE = SensorNoise(0.002, 0.001)
 
@@ -47,3 +51,32 @@ def test_the_command_prints_and_writes_every_part(tmp_path):
     assert found["design"]["fewer"] == 10
     said = CliRunner().invoke(cli, ["evaluate", "calibration", "--noise", "0.002,0.001"])
     assert "three numbers" in said.output
+
+
+def test_points_that_average_over_a_piece_of_wall_do_not_make_it_smoother():
+    """30 walls of 4 mm over 8 cm, in pieces of 8 cm, whose means have 0.86 of the deviation.
+
+    The size is known to 2.7 %: it is off by 10 % with a probability of 2e-4.
+    """
+    found = []
+    walls = np.tile([[0.0, 0.0], [6.0, 0.0]], (30, 1, 1))
+    surface = Surface.of(walls, 0.004, 0.08, seed=3)
+    along = np.arange(0.0, 5.99, 0.004)
+    for wall in range(30):
+        off = surface.at(np.full(len(along), wall), along)[:1480].reshape(74, 20)
+        t = along[:1480].reshape(74, 20).mean(1)
+        found.append(Profile(t, off.mean(1), np.full(74, 0.08), np.full(74, 1e-10)))
+    size, length = unevenness(found, np.random.default_rng(0))
+    print(size, length)
+    assert abs(size.value / 0.004 - 1) < 0.1
+    assert 0.05 < length.value < 0.13
+
+
+def test_straight_walls_of_a_small_room_are_no_error():
+    """Some of the walls drawn to know how well this is known are perfectly straight: their logarithm was no number."""
+    noise, rng = SensorNoise(0.002, 0.001, range_growth=3e-4), np.random.default_rng(1)
+    world = rectangular_room(4.5, 2.5)
+    sensor, pose = SimulatedSensor(world, noise), random_pose(world, rng)
+    found = calibrate([sensor.scan(pose, rng)[0] for _ in range(60)])
+    assert np.isfinite([found.unevenness.value, found.unevenness.high]).all()
+    assert found.noise.unevenness < 0.002

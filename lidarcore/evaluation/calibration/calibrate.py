@@ -8,7 +8,7 @@ import numpy as np
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.renewal import renewal, resampling
 from lidarcore.evaluation.calibration.systematic import alignment, range_bias, wall_shapes
-from lidarcore.evaluation.calibration.unevenness import Profile, profiles, unevenness
+from lidarcore.evaluation.calibration.unevenness import Profile, profiles, unevenness, usual
 from lidarcore.evaluation.calibration.variances import Bands, variance_model
 from lidarcore.evaluation.calibration.wall_beams import WallBeams, beams_on_walls
 from lidarcore.evaluation.calibration.white import Scatter, tails, white_parts, white_scatter
@@ -79,16 +79,23 @@ class Calibration:
     def told(self) -> dict[str, float | None]:
         """Parts of SensorNoise as settings take them, or None where the interval begins at 0.
 
-        Such a part cannot be told from none at all: its value says nothing, only its upper end does.
+        Such a part cannot be told from none at all: its value says nothing, only its upper end does. Unevenness and its
+        length are drawn to what rooms have, the more the less is known of them; their intervals say what the walls say.
         """
-        found = {
-            "sigma_range": self.sigma_range,
-            "sigma_bearing": self.sigma_bearing,
-            "range_growth": self.range_growth,
-            "unevenness": self.unevenness,
-            "unevenness_length": self.unevenness_length if self.unevenness.low > 0 else None,
+        found: dict[str, float | None] = {
+            name: part.value if part.low > 0 else None
+            for name, part in (
+                ("sigma_range", self.sigma_range),
+                ("sigma_bearing", self.sigma_bearing),
+                ("range_growth", self.range_growth),
+            )
+        } | {"unevenness": None, "unevenness_length": None}
+        if self.unevenness_length is not None and self.unevenness.low > 0:
+            found["unevenness"], found["unevenness_length"] = usual(self.unevenness, self.unevenness_length)
+        return {
+            name: None if value is None else min(max(value, _BOUNDS[name][0]), _BOUNDS[name][1])
+            for name, value in found.items()
         }
-        return {name: _told(part, *_BOUNDS[name]) for name, part in found.items()}
 
     @property
     def noise(self) -> SensorNoise:
@@ -125,10 +132,6 @@ class Calibration:
             else:
                 needed[name] = None
         return needed
-
-
-def _told(part: Interval | None, least: float, most: float) -> float | None:
-    return min(max(part.value, least), most) if part is not None and part.low > 0 else None
 
 
 def calibrate(scans: Iterable[Scan]) -> Calibration:

@@ -43,8 +43,8 @@ class WallBeams:
 
     def near(self) -> NDArray[np.bool_]:
         """(N,) whether a beam ends where noise lets it, judged by the other scans' beams in its bin."""
-        off = np.abs(self.error - _medians(self.error, self.bin)[self.bin])
-        spread = _MAD * np.maximum(_medians(off, self.bin), _LEAST_SPREAD)
+        off = np.abs(self.error - medians(self.error, self.bin)[self.bin])
+        spread = _MAD * np.maximum(medians(off, self.bin), _LEAST_SPREAD)
         near: NDArray[np.bool_] = off <= _OUTLIER * spread[self.bin]
         return near
 
@@ -91,14 +91,14 @@ def _median_scan(ranges: Array, bearings: Array, sectors: int) -> Scan:
     """A scan with hardly any noise: the median range in each sector, NaN where most beams do not return."""
     sector = ((bearings + np.pi) % (2 * np.pi) / (2 * np.pi) * sectors).astype(np.int64) % sectors
     far = np.where(np.isfinite(ranges), ranges, np.inf)
-    medians = np.full(sectors, np.nan)
+    typical = np.full(sectors, np.nan)
     seen = np.unique(sector)
-    medians[seen] = _medians(far, np.searchsorted(seen, sector))
-    medians[np.isinf(medians)] = np.nan
-    return Scan(medians, 2 * np.pi * (np.arange(sectors) + 0.5) / sectors - np.pi)
+    typical[seen] = medians(far, np.searchsorted(seen, sector))
+    typical[np.isinf(typical)] = np.nan
+    return Scan(typical, 2 * np.pi * (np.arange(sectors) + 0.5) / sectors - np.pi)
 
 
-def _medians(values: Array, bins: Ints) -> Array:
+def medians(values: Array, bins: Ints) -> Array:
     """(B,) the median of the values in each bin 0 ... B - 1, none of them empty."""
     order = np.lexsort((values, bins))
     n = np.bincount(bins)
