@@ -88,7 +88,6 @@ def _table(found: "Honesty") -> "Table":
             cell(judged.coverage, 1.0, 3),
             cell(judged.anees, 1.0, 2),
             "{:.2f} to {:.2f}".format(*judged.band),
-            f"{100 * judged.steps:.0f} %",
-            f"{judged.median:.2f}",
+            *((f"{100 * judged.steps:.0f} %", f"{judged.median:.2f}") if judged.median >= 0 else ("–", "–")),
         )
     return table

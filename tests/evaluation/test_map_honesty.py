@@ -86,6 +86,7 @@ def test_the_command_prints_and_writes_the_figures_of_every_world_and_refuses_ot
         assert one["judged"]["10 keyframes"]["median"] is None  # 2 s are too short
         assert 0 <= one["judged"]["poses"]["coverage"]["value"] <= 1
         assert f"{one['judged']['poses']['median']:.2f}" in result.output
+    assert "nan" not in result.output
     output.unlink()
     result = CliRunner().invoke(cli, [*command, "--world", "moon", "-o", str(output)])
     assert isinstance(result.exception, SimulationError)
