@@ -297,12 +297,15 @@ import sys, time
 from test_landmark_store import landmarks
 from lidarcore_app.jobs.landmark_store import LandmarkStore
 store = LandmarkStore(sys.argv[1])
-store.listeners.append(lambda change: print("stored", *(m.id for m in change.landmarks), flush=True))
+def say(*words):  # in one piece, as two threads do
+    sys.stdout.write(" ".join(map(str, words)) + "\\n")
+    sys.stdout.flush()
+store.listeners.append(lambda change: say("stored", *(m.id for m in change.landmarks)))
 run, n = store.begin("run"), 0
 while True:
     n += 1
     run.put(landmarks(n))
-    print("confirmed", n, time.time(), flush=True)
+    say("confirmed", n, time.time())
     time.sleep(0.02)
 """
 

@@ -104,6 +104,7 @@ def test_the_tables_of_the_command_hold_the_numbers_of_the_library(
         assert cells == [f"{clusters:.2f}", f"{landmarks:.1f}"]
 
 
+@pytest.mark.long
 def test_every_figure_is_there_and_nothing_is_fetched(report: str) -> None:
     found = Tables(report)
     assert [f"Figure {n}" in report for n in (3, 4, 5, 6)] == [True] * 4
@@ -140,11 +141,13 @@ def test_seeds_runs_and_trajectories_have_errors_of_their_own_and_a_run_its_obje
     assert np.array_equal(posts, drive(0, "straight")[1])
 
 
+@pytest.mark.long
 def test_without_the_filter_the_method_makes_no_difference(result: ClusteringStudy) -> None:
     for name in ("accumulated", "rms", "anees"):
         assert np.ptp(result.error("without", name), axis=2).max() == 0
 
 
+@pytest.mark.long
 def test_the_filter_gains_on_odometry_and_coasts_while_objects_are_lost(result: ClusteringStudy) -> None:
     assert result.error("with", "rms").mean() < 0.4 * result.error("without", "rms").mean()
     for outcome in result.outcomes[: 3 * len(METHODS)]:
@@ -186,6 +189,7 @@ def with_dbscan(result: ClusteringStudy, factor: float, spread: float) -> Cluste
     return ClusteringStudy(replace(result.design, runs=10), outcomes)
 
 
+@pytest.mark.long
 def test_claims_agree_differ_or_stay_open_as_the_runs_say(result: ClusteringStudy) -> None:
     def verdict(factor: float, spread: float) -> bool | None:
         return next(

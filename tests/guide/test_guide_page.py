@@ -59,6 +59,7 @@ def test_the_shipped_page_is_what_this_code_makes_but_for_numbers_and_drawings(
     assert without(shipped, *chance) == without(remade, *chance), "make guide"
 
 
+@pytest.mark.long
 def test_every_number_comes_out_again(shipped: str, remade: str) -> None:
     pairs = list(zip(numbers(shipped), numbers(remade), strict=True))
     assert len(pairs) > 150
@@ -173,6 +174,7 @@ def test_bars_are_as_long_as_what_is_written_beside_them(shipped: str) -> None:
     assert np.allclose(lengths / shares, (lengths / shares).mean(), rtol=5e-3)
 
 
+@pytest.mark.long
 def test_a_name_that_there_is_not_is_no_empty_place(fresh: Measurement) -> None:
     for words in ("{nothing:1%}", "{papers[cwlf nothing]:1}", "![nothing]"):
         with pytest.raises(KeyError, match="nothing"):

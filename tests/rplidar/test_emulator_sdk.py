@@ -76,6 +76,7 @@ def find(rows, there, begin):
     return None
 
 
+@pytest.mark.long
 def test_slamtecs_sdk_and_our_decoder_agree_node_for_node(tmp_path):
     with EmulatorProcess(moving=True, people=3) as emulator, overheard(emulator.port) as (port, heard):
         client = [sys.executable, Path(__file__).with_name("slamtec_client.py"), port]
