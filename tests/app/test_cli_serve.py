@@ -77,6 +77,7 @@ def test_what_cannot_be_played_is_one_sentence(arguments: list[str], words: list
     assert_refused(run("serve", "--http-port", 0, *arguments), *words)
 
 
+@pytest.mark.long
 def test_a_busy_sensor_is_one_sentence(sensor: EmulatorProcess) -> None:
     with Serial(sensor.port, exclusive=True):
         assert_refused(run("serve", "--http-port", 0, "--port", sensor.port), sensor.port, "in use", "pid")

@@ -14,6 +14,7 @@ def compiling(process: psutil.Process) -> list[psutil.Process]:
     return [child for child in process.children() if ahead.__name__ in child.cmdline()]
 
 
+@pytest.mark.long
 def test_kernels_are_compiled_in_a_process_that_ends_with_the_server(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 from lidarcore_app.jobs.sensor_memory import MOST, SensorMemory
 from lidarcore_app.pipeline.noise_watch import SCANS
 from lidarcore_app.pipeline.sensor_setups import SensorSetup, SensorSetups
@@ -100,6 +101,7 @@ def test_another_recording_begins_with_a_noise_of_its_own(make_server: Callable[
     assert np.isclose(server.get("/settings")["clusters"]["noise"]["sigma_range"], 0.2)
 
 
+@pytest.mark.long
 def test_the_emulated_sensor_begins_with_the_noise_it_has(make_server: Callable[..., Server]) -> None:
     """So that the first verdict someone sees on the ellipses is on the methods, not on a wrong setting."""
     server = make_server(recording=None, device=DeviceOptions(emulated=True))

@@ -22,6 +22,7 @@ MANY = ("lego_reference.txt", "lego_encoders.txt", "chunks.mcap", "map_nested.js
     "samples.csv", "dump.txt", "packed.npz")  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", NAMES)
 def test_a_file_of_many_small_things_takes_little_memory(tmp_path: Path, name: str) -> None:
     path = make(tmp_path, name, int(SIZES.get(name, USUAL) * MEBIBYTE))

@@ -169,7 +169,7 @@ def test_every_control_has_a_name_of_its_own(visitor: Visitor) -> None:
         assert [name for name in count if count[name] > 1] == [], panel
 
 
-@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("theme", [pytest.param("light", marks=pytest.mark.long), "dark"])
 def test_axe_finds_nothing_on_any_tab(visit: Callable[..., Visitor], theme: str) -> None:
     visitor = visit(1400, 900, theme=theme, reduced_motion="reduce").open()
     expect(visitor.page.locator("html")).to_have_attribute("data-theme", theme)

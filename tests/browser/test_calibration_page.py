@@ -163,6 +163,7 @@ def test_a_second_start_is_refused_and_shows_the_one_that_runs(visitor: Visitor)
     expect(page.get_by_role("button", name="Calibrate")).to_be_enabled()
 
 
+@pytest.mark.long
 def test_another_source_ends_it_in_plain_words(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     paused(visitor)

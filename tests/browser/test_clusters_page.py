@@ -25,6 +25,7 @@ def found(server: Server) -> int:
     return len(server.get("frame")["clusters"] or ())
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_method_is_switched_live_and_shows_only_what_it_uses(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page

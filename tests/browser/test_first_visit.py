@@ -58,6 +58,7 @@ def test_methods_are_compared_on_a_corner_that_all_found(newcomer: Visitor) -> N
     closed(newcomer)
 
 
+@pytest.mark.long
 def test_the_sensor_is_calibrated(newcomer: Visitor) -> None:
     newcomer.page.get_by_role("button", name="Calibrate my sensor").click()
     expect(newcomer.page.get_by_role("progressbar", name="Scans collected")).to_be_in_viewport()
@@ -65,6 +66,7 @@ def test_the_sensor_is_calibrated(newcomer: Visitor) -> None:
     closed(newcomer)
 
 
+@pytest.mark.long
 def test_a_map_is_built(newcomer: Visitor) -> None:
     server, page = newcomer.server, newcomer.page
     page.get_by_role("button", name="Build a map").click()

@@ -225,6 +225,7 @@ def test_message_goes_by_itself_but_not_while_it_has_the_focus(visit: Callable[.
     expect(message).to_have_count(0)
 
 
+@pytest.mark.long
 def test_speed_changed_in_the_page_is_the_lidars(live: Watched) -> None:
     live.page.get_by_label("Motor speed").fill("720")
     live.page.keyboard.press("Enter")

@@ -270,6 +270,7 @@ def test_setting_a_pose_is_given_up_by_escape_and_can_be_done_in_numbers(mapped:
     )
 
 
+@pytest.mark.long
 def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
     page, server = mapped.page, mapped.server
     session = server.get("localization")["session"]

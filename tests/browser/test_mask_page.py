@@ -53,6 +53,7 @@ def ink(visitor: Visitor, bearing: float, at: float) -> int:
     return int(visitor.page.evaluate(INK, pixel))
 
 
+@pytest.mark.long
 def test_a_suggested_mask_takes_the_robot_out_of_the_scan(visitor: Visitor, robot: Path) -> None:
     others = dict.fromkeys(("grid", "corners", "ellipses"), False)
     visitor.server.patch("settings", {"view": {"layers": others}})

@@ -2,10 +2,12 @@
 
 import re
 
+import pytest
 from browsing import Visitor
 from playwright.sync_api import expect
 
 
+@pytest.mark.long
 def test_two_clicks_measure_as_rest_does(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     frame = visitor.await_frame(server.pause())

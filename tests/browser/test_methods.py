@@ -41,6 +41,7 @@ def test_covariance_kind_changes_the_ellipses(visitor: Visitor) -> None:
     expect(page.locator("#legend")).to_contain_text("published")
 
 
+@pytest.mark.long
 def test_comparison_fills_the_table_for_every_method(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     server.show(HOKUYO, 120)

@@ -50,6 +50,7 @@ def test_figures_are_those_of_the_frame(visitor: Visitor) -> None:
     assert page.locator("#corner-table tbody tr").count() == len(frame["corners"])
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_plots_follow_the_frames(visitor: Visitor) -> None:
     page = visitor.page

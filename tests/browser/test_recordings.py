@@ -101,6 +101,7 @@ def test_name_that_is_taken_can_be_replaced(golf: Visitor) -> None:
     wait_until(lambda: golf.server.get("source")["state"] == "playing", "it plays again")
 
 
+@pytest.mark.long
 def test_transport_pauses_steps_seeks_and_plays_on(golf: Visitor) -> None:
     server, page = golf.server, golf.page
     wait_until(lambda: server.get("source")["complete"], "all scans are read")

@@ -53,6 +53,7 @@ def test_link_to_a_recording_that_is_gone_says_so(server: Server, visit: Callabl
     assert server.get("source")["kind"] == "emulator"
 
 
+@pytest.mark.long
 def test_plain_address_leaves_what_others_set_up(server: Server, visit: Callable[..., Visitor]) -> None:
     wanted = server.patch("settings", SHOWN)
     visitor = visit().open()

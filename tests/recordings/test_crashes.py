@@ -134,6 +134,7 @@ if may_mount():
     FULL.append((by_small_disk, "the disk is full: free some space"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("fill", "cause"), FULL)
 def test_a_full_disk_is_reported_and_what_was_before_can_be_read(tmp_path, fill, cause):
     done = fill(tmp_path)
