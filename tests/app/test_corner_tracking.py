@@ -33,8 +33,11 @@ def test_a_corner_that_moves_a_little_keeps_its_id_and_one_that_jumps_does_not()
     tracker = Tracker()
     first = ids(tracker, [(0, 0), (2, 0)])
     assert ids(tracker, [(2.1, 0), (0.1, 0.1)]) == first[::-1]
-    assert ids(tracker, [(0.1 + GATE + 0.01, 0.1), (2.1, 0)])[1] == first[0 + 1]
-    assert len({*first, *ids(tracker, [(9, 9)])}) == 3
+    jumped, stayed = ids(tracker, [(0.1 + GATE + 0.01, 0.1), (2.1, 0)])
+    assert stayed == first[1]
+    assert jumped not in first
+    a_metre_on, _ = ids(tracker, [(1.5, 0.1), (2.1, 0)])
+    assert a_metre_on not in (*first, jumped)
 
 
 def test_the_closest_pair_is_matched_first() -> None:

@@ -2,8 +2,9 @@
 
     python tests/mutants/run.py [NUMBER or part of a file's path ...]
 
-Only tests that `make test` runs count. A fault that no test notices is printed as MISSED, and the exit code is 1. `interpreted` faults are in compiled
-kernels: their tests run them as plain Python, which saves compiling those that use them.
+Only tests that `make test` runs count. A fault that no test notices is printed as MISSED, and the exit code is 1.
+`interpreted` faults are in compiled kernels: their tests run them as plain Python, which saves compiling those that use
+them.
 """
 
 import os
