@@ -174,6 +174,16 @@ def test_names_of_reports_never_become_paths(shared_server: Server, name: str) -
     assert (shared_server.folder / "room.npz").exists()
 
 
+def test_what_else_lies_beside_the_reports_is_neither_shown_nor_deleted(server: Server) -> None:
+    folder = server.folder.parent / "studies"
+    folder.mkdir()
+    (folder / "notes.html").write_text("mine")
+    for method in ("GET", "DELETE"):
+        assert_problem(server.http.request(method, "/studies/reports/notes"), 404)
+    assert server.get("/studies")["reports"] == []
+    assert (folder / "notes.html").read_text() == "mine"
+
+
 def test_reports_are_not_without_number(server: Server) -> None:
     folder = server.folder.parent / "studies"
     folder.mkdir()
