@@ -198,6 +198,9 @@ def test_with_the_map_its_walls_and_their_card_go(look: Callable[..., Visitor], 
     mapped.patch("settings", {"navigation": {"mode": "off"}})
     expect(found).to_be_hidden()
     wait_until(lambda: visitor.knows("mapped") == {"walls": [], "corners": []}, "no wall is known")
+    assert visitor.knows("mappedWall") is None, (
+        "the next map counts from zero: its wall of that number is another"
+    )
     visitor.page.mouse.move(*visitor.pixel_at(off_middle(wall)))
     visitor.page.wait_for_timeout(300)
     assert "of the map" not in visitor.page.locator("#hover").inner_text()
