@@ -86,6 +86,12 @@ _MIGRATIONS: tuple[tuple[str, ...], ...] = (
             first_seen REAL NOT NULL, last_seen REAL NOT NULL, count INTEGER NOT NULL,
             PRIMARY KEY (session, id)) STRICT, WITHOUT ROWID""",
     ),
+    (  # so does the occupancy grid
+        """CREATE TABLE grids (
+            session INTEGER PRIMARY KEY, resolution REAL NOT NULL,
+            x REAL NOT NULL, y REAL NOT NULL, heading REAL NOT NULL,
+            rows INTEGER NOT NULL, columns INTEGER NOT NULL, cells BLOB NOT NULL) STRICT""",
+    ),
 )
 
 

@@ -10,8 +10,8 @@ from lidarcore.errors import LocalizationError
 from lidarcore.geometry import compose, pose_difference
 from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, write_ros_map
 from lidarcore.mapping.relocation import Relocator, query_of
-from lidarcore.mapping.relocation.field import FULL, make_field
-from lidarcore.mapping.relocation.search import best_pose, fit_at, top_nodes
+from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
+from lidarcore.mapping.relocation.search import best_pose, fit_at, squares
 from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
 from lidarcore.simulation.rooms import rectangular_room
 
@@ -46,7 +46,9 @@ def test_branch_and_bound_finds_what_brute_force_finds():
             for y, x in np.argwhere(field.room[0] > 0).tolist()
         }
         best = max(fits.values())
-        nodes, bounds = top_nodes(field.levels, field.room, columns, rows, 0)
+        height, width = field.room.shape[1:]
+        everywhere = (LEVELS - 1, np.arange(7), (0, 0, width, height))
+        nodes, bounds = squares(field.levels, field.room, columns, rows, *everywhere, 0)
         order = np.argsort(-bounds, kind="stable")
         none = np.empty((0, 3), np.int32)
         fit, *place = best_pose(
