@@ -68,6 +68,10 @@ class UnknownLandmarkError(LandmarkMapError, LookupError):
     """The map holds no landmark with this id."""
 
 
+class UnknownWallError(LandmarkMapError, LookupError):
+    """The map never held a wall with this id."""
+
+
 class UnknownSessionError(LandmarkMapError, LookupError):
     """The database holds no session with this id."""
 

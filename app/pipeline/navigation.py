@@ -66,7 +66,7 @@ class MapStore(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LocalizationStatus:
-    """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method` tells the pose."""
+    """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what."""
 
     mode: Literal["off", "localize", "slam"]
     method: Literal["scans", "landmarks"] | None

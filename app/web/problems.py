@@ -34,6 +34,7 @@ STATUS: dict[type, int] = {
     library.NoAnswerError: 504,
     library.MaskError: 409,  # nothing to suggest one from yet
     library.UnknownLandmarkError: 404,
+    library.UnknownWallError: 404,
     library.UnknownSessionError: 404,
     library.MapFileError: 422,
     library.LandmarkMapError: 503,  # the file of maps fails

@@ -10,6 +10,7 @@ from lidarcore.landmarks.database import PATIENCE, Database, path_of
 from lidarcore.landmarks.landmark import Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap, purge
 from lidarcore.landmarks.queries import check_finite
+from lidarcore.landmarks.wall_store import forget_walls
 
 _SESSIONS = """SELECT id, source, mode, started, ended,
     (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id),
@@ -129,7 +130,7 @@ class Atlas:
         return LandmarkMap(self._database, row[0])
 
     def delete(self, session: int) -> None:
-        """Give up a session, its landmarks and their history; raises UnknownSessionError.
+        """Give up a session, its landmarks and walls and their history; raises UnknownSessionError.
 
         The session is gone at once and whole; the room it takes is freed bit by bit, so that writers need not wait. If
         that is interrupted, the next call frees it.
@@ -141,11 +142,13 @@ class Atlas:
                 connection.execute(f"DELETE FROM {table} WHERE session = ?", (session,))
         with self._database.reading() as connection:
             left = connection.execute(
-                "SELECT session FROM extents WHERE session NOT IN (SELECT id FROM sessions)"
+                """SELECT session FROM (SELECT session FROM extents UNION SELECT session FROM wall_history)
+                    WHERE session NOT IN (SELECT id FROM sessions)"""
             )
             gone = [row[0] for row in left]
         for id in gone:
             purge(self._database, id)
+            forget_walls(self._database, id)
 
 
 def _session(row: tuple[Any, ...]) -> Session:

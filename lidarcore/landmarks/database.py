@@ -19,6 +19,7 @@ from lidarcore.foreign_database import MOST_BYTES
 UNIT = "m"
 _APPLICATION = 0x4C4D4150  # "LMAP", in the header of the file
 PATIENCE = 10.0  # s to wait while another process writes
+AT_ONCE = 1000  # rows of a table that one transaction gives up: others wait no longer
 
 # What brings a file from each version to the next; a new version is appended and none is ever edited.
 _MIGRATIONS: tuple[tuple[str, ...], ...] = (
@@ -86,7 +87,23 @@ _MIGRATIONS: tuple[tuple[str, ...], ...] = (
             first_seen REAL NOT NULL, last_seen REAL NOT NULL, count INTEGER NOT NULL,
             PRIMARY KEY (session, id)) STRICT, WITHOUT ROWID""",
     ),
-    (  # so does the occupancy grid
+    (  # what walls were; those there are begin theirs with what they are
+        """CREATE TABLE wall_history (
+            session INTEGER NOT NULL, wall INTEGER NOT NULL, second INTEGER NOT NULL,
+            alpha REAL NOT NULL, r REAL NOT NULL,
+            var_alpha REAL NOT NULL, cov_alpha_r REAL NOT NULL, var_r REAL NOT NULL,
+            x1 REAL NOT NULL, y1 REAL NOT NULL, x2 REAL NOT NULL, y2 REAL NOT NULL,
+            length REAL NOT NULL, var_length REAL NOT NULL,
+            ended_1 INTEGER NOT NULL, ended_2 INTEGER NOT NULL,
+            corner_1 INTEGER NOT NULL, corner_2 INTEGER NOT NULL,
+            first_seen REAL NOT NULL, last_seen REAL NOT NULL, count INTEGER NOT NULL,
+            PRIMARY KEY (session, wall, second)) STRICT, WITHOUT ROWID""",
+        """INSERT INTO wall_history SELECT session, id,
+            CAST(last_seen AS INTEGER) - (last_seen < CAST(last_seen AS INTEGER)), alpha, r,
+            var_alpha, cov_alpha_r, var_r, x1, y1, x2, y2, length, var_length,
+            ended_1, ended_2, corner_1, corner_2, first_seen, last_seen, count FROM walls""",
+    ),
+    (  # an occupancy grid stands there, too
         """CREATE TABLE grids (
             session INTEGER PRIMARY KEY, resolution REAL NOT NULL,
             x REAL NOT NULL, y REAL NOT NULL, heading REAL NOT NULL,

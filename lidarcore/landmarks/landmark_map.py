@@ -8,9 +8,8 @@ from typing import get_args
 
 from numpy.typing import ArrayLike
 
-from lidarcore.errors import LandmarkError, UnknownLandmarkError, UnknownSessionError
-from lidarcore.landmarks import wall
-from lidarcore.landmarks.database import Database
+from lidarcore.errors import LandmarkError, UnknownLandmarkError, UnknownSessionError, UnknownWallError
+from lidarcore.landmarks.database import AT_ONCE, Database
 from lidarcore.landmarks.landmark import COLUMNS, Landmark, as_covariance, as_position
 from lidarcore.landmarks.nearest import Metric, Neighbour, Neighbourhood
 from lidarcore.landmarks.queries import (
@@ -26,6 +25,7 @@ from lidarcore.landmarks.queries import (
 )
 from lidarcore.landmarks.stored_grid import StoredGrid
 from lidarcore.landmarks.wall import StoredWall
+from lidarcore.landmarks.wall_store import replace_walls, wall_history, walls_of
 
 _ALL = Filter()
 _STATE = ", ".join(COLUMNS[:-1])  # all but the id
@@ -49,16 +49,13 @@ _WIDEN = (
     )
 )
 _IN_SESSION = f"SELECT {SELECTED} FROM landmarks WHERE session = :session"
-_WALLS = ", ".join(wall.COLUMNS)
-_WALL_VALUES = ", ".join("?" for _ in wall.COLUMNS)
-_AT_ONCE = 1000  # landmarks, and states of some, that one transaction gives up: others wait no longer
 
 
 class LandmarkMap:
     """The landmarks, and the walls, of one session, in metres in its world frame. An Atlas makes it.
 
-    What `put` was given is on the disk when it returns. History keeps the last state of a landmark within each second
-    of its last_seen.
+    What `put` was given is on the disk when it returns. History keeps the last state of a landmark or wall within
+    each second of its last_seen.
     """
 
     def __init__(self, database: Database, session: int) -> None:
@@ -100,17 +97,25 @@ class LandmarkMap:
         """Store walls in place of those that the map has, all or none. Raises UnknownSessionError if it was deleted."""
         with self._database.writing() as connection:
             self._check(connection)
-            connection.execute("DELETE FROM walls WHERE session = ?", (self.session,))
-            connection.executemany(
-                f"INSERT INTO walls (session, {_WALLS}) VALUES (?, {_WALL_VALUES})",
-                ((self.session, *astuple(one)) for one in walls),
-            )
+            replace_walls(connection, self.session, walls)
 
     def walls(self) -> list[StoredWall]:
         """All walls in the order of their ids."""
-        query = f"SELECT {_WALLS} FROM walls WHERE session = ? ORDER BY id"
         with self._database.reading() as connection:
-            return [StoredWall(*row) for row in connection.execute(query, (self.session,))]
+            return walls_of(connection, self.session)
+
+    def wall_history(self, id: int, after: float = -math.inf, limit: int = 1000) -> list[StoredWall]:
+        """States of one wall with last_seen > after (s), oldest first, also of one that is no longer in the map.
+
+        Raises UnknownWallError.
+        """
+        check_limit("limit", limit)
+        check_order("-inf", -math.inf, "after", after)
+        with self._database.reading() as connection:
+            found = wall_history(connection, self.session, id, after, limit)
+        if found is None:
+            raise UnknownWallError(f"Session {self.session} has no history of a wall {id}.")
+        return found
 
     def put_grid(self, grid: StoredGrid) -> None:
         """Store an occupancy grid in place of that which the map has. Raises UnknownSessionError if it was deleted."""
@@ -233,14 +238,14 @@ def purge(database: Database, session: int) -> None:
 
 def _purge_some(database: Database, session: int) -> bool:
     """True if nothing was left."""
-    some = f"WHERE session = {session} LIMIT {_AT_ONCE}"
+    some = f"WHERE session = {session} LIMIT {AT_ONCE}"
     with database.writing() as connection:
         connection.execute(f"DELETE FROM places WHERE id IN (SELECT id FROM landmarks {some})")
         landmarks = connection.execute(f"DELETE FROM landmarks WHERE id IN (SELECT id FROM landmarks {some})")
         states = connection.execute(
             f"DELETE FROM history WHERE (landmark, second) IN (SELECT landmark, second FROM history {some})"
         )
-        if max(landmarks.rowcount, states.rowcount) == _AT_ONCE:
+        if max(landmarks.rowcount, states.rowcount) == AT_ONCE:
             return False
         connection.execute("DELETE FROM extents WHERE session = ?", (session,))
         return True

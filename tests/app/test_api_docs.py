@@ -26,7 +26,7 @@ from lidarcore_app.web.routes.sensor import FoundDeviceJson, SuggestionJson
 from lidarcore_app.web.routes.sessions import SessionsJson
 from lidarcore_app.web.routes.source import SimulationJson
 from lidarcore_app.web.routes.studies import StudiesJson
-from lidarcore_app.web.routes.walls import WallsJson
+from lidarcore_app.web.routes.walls import WallHistoryJson, WallsJson
 from lidarcore_app.web.schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
 from pydantic import TypeAdapter, ValidationError
 from serving import Json, Server, strict_json
@@ -102,6 +102,7 @@ TYPES = {
     ("get", "/trajectory"): TrajectoryJson,
     ("get", "/walls"): WallsJson,
     ("get", "/walls/nearest"): WallsJson,
+    ("get", "/walls/{id}/history"): WallHistoryJson,
     ("get", "/map/grid"): None,
     ("post", "/odometry"): None,
 }

@@ -1,6 +1,7 @@
 """Walls of maps in the file of maps: kept, told again, and still there after the server was killed."""
 
 import math
+import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import astuple, replace
@@ -13,10 +14,10 @@ import pytest
 from lidarcore_app.jobs.landmark_store import LandmarkStore
 from lidarcore_app.jobs.wall_writer import CONFIRMED, from_stored, to_stored
 from processes import Serving
-from serving import write_room
+from serving import Server, assert_problem, write_room
 from waiting import wait_until
 
-from lidarcore.errors import LandmarkMapError, UnknownSessionError
+from lidarcore.errors import LandmarkError, LandmarkMapError, UnknownSessionError, UnknownWallError
 from lidarcore.landmarks import Atlas, StoredWall
 from lidarcore.mapping.walls import WallTable
 
@@ -70,6 +71,76 @@ def test_walls_that_make_no_sense_leave_those_that_were_there(tmp_path: Path) ->
             with pytest.raises(LandmarkMapError):
                 kept.put_walls(wrong)
             assert kept.walls() == [stored(0), stored(1)]
+
+
+def test_what_a_wall_was_is_kept_once_a_second_and_stays_when_it_is_gone(tmp_path: Path) -> None:
+    states = [
+        replace(stored(4), length=length, last_seen=20 + length) for length in (0.0, 0.7, 1.2, 1.9, 3.0)
+    ]
+    other = stored(5)
+    with Atlas(tmp_path / "maps.db") as atlas:
+        kept = atlas.begin("one", 1.0)
+        for state in states:
+            kept.put_walls([state, other])
+        kept.put_walls([other])  # the fourth became part of it
+        atlas.begin("other", 2.0).put_walls([replace(stored(4), r=9.0)])
+    with Atlas(tmp_path / "maps.db") as atlas:
+        assert atlas[1].wall_history(4) == [states[1], states[3], states[4]]
+        assert atlas[1].wall_history(4, after=20.7, limit=1) == [states[3]]
+        assert atlas[1].wall_history(4, after=23.0) == []
+        assert atlas[1].wall_history(5) == [other]
+        with pytest.raises(UnknownWallError, match="wall 6"):
+            atlas[1].wall_history(6)
+        with pytest.raises(LandmarkError):
+            atlas[1].wall_history(4, limit=0)
+
+
+def test_the_history_of_walls_goes_with_its_session(tmp_path: Path) -> None:
+    path = tmp_path / "maps.db"
+
+    def states() -> list[tuple[int, int]]:
+        with closing(sqlite3.connect(path)) as file:
+            return file.execute("SELECT session, count(*) FROM wall_history GROUP BY session").fetchall()
+
+    with Atlas(path) as atlas:
+        for name in ("one", "other"):
+            kept = atlas.begin(name, 1.0)
+            for second in range(3):
+                kept.put_walls([replace(stored(id), last_seen=float(50 + second)) for id in range(700)])
+        assert states() == [(1, 2100), (2, 2100)]
+        atlas.delete(1)
+        assert states() == [(2, 2100)]
+        with closing(sqlite3.connect(path)) as file, file:
+            file.execute("DELETE FROM sessions WHERE id = 2")  # as far as a deletion that was interrupted
+        atlas.begin("third", 2.0)
+        atlas.delete(3)
+        assert states() == []
+
+
+def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
+    store = server.app.state.server.landmarks
+    assert_problem(server.http.get("/walls/4/history"), 404)
+    run = store.begin_walls("room.mcap")
+    states = [replace(stored(4), length=1.0 + i, last_seen=100.0 + i) for i in range(5)]
+    for state in states:
+        run.put(walls(state))
+        wait_until(lambda: run.session is not None and store.status.behind_s == 0)
+    told = server.get("/walls/4/history", limit=3)
+    assert told["session"] == run.session
+    assert told["wall"] == server.get("/walls", session=run.session)["walls"][0]
+    assert [wall["length"] for wall in told["history"]] == [1.0, 2.0, 3.0]
+    assert told["history"][0]["covariance"] == [[1e-6, 1e-7], [1e-7, 1e-5]]
+    rest = server.get("/walls/4/history", limit=3, after=told["next"], session=run.session)
+    assert [wall["last_seen"] for wall in rest["history"]] == [103.0, 104.0]
+    assert rest["next"] is None
+    run.put(walls(stored(7)))
+    wait_until(lambda: store.status.behind_s == 0)
+    gone = server.get("/walls/4/history")
+    assert gone["wall"] is None
+    assert gone["history"][-1]["length"] == 5.0
+    assert "wall 9" in assert_problem(server.http.get("/walls/9/history"), 404)["detail"]
+    assert_problem(server.http.get("/walls/4/history", params={"session": 99}), 404)
+    assert_problem(server.http.get(f"/walls/{2**70}/history"), 422)
 
 
 def test_a_run_keeps_its_confirmed_walls_and_says_when_it_has_ended(tmp_path: Path) -> None:

@@ -323,6 +323,25 @@ def test_a_file_of_version_1_opens_with_all_it_had_as_one_session(tmp_path):
             assert landmark_map.find(Box(20, 30, 40, 50)).landmarks == inside != []
 
 
+def test_walls_of_a_file_of_version_3_begin_their_history_with_what_they_are(tmp_path):
+    """Written by the third version, which kept no history of walls: two of them, one seen before the clock began."""
+    path = shutil.copy(Path(__file__).with_name("version_3.db"), tmp_path / "old.db")
+    for _ in range(2):
+        with Atlas(path) as atlas:
+            (session,) = atlas.sessions()
+            walls = atlas[session.id].walls()
+            assert [(wall.id, wall.last_seen, wall.count) for wall in walls] == [(0, 20.5, 5), (7, -3.25, 8)]
+            assert [atlas[session.id].wall_history(wall.id) for wall in walls] == [[wall] for wall in walls]
+    grown = [
+        replace(wall, length=3.0, last_seen=wall.last_seen + shift)
+        for wall, shift in zip(walls, (0.4, 1.0), strict=True)
+    ]
+    with Atlas(path) as atlas:
+        atlas[session.id].put_walls(grown)
+        assert atlas[session.id].wall_history(0) == grown[:1]  # in the same second
+        assert atlas[session.id].wall_history(7) == [walls[1], grown[1]]
+
+
 def test_an_empty_file_of_version_1_has_no_session(tmp_path):
     path = shutil.copy(Path(__file__).with_name("version_1.db"), tmp_path / "old.db")
     with sqlite3.connect(path) as connection:

@@ -3,7 +3,7 @@
 import io
 import math
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
@@ -24,18 +24,20 @@ from lidarcore.mapping.grid import OccupancyGrid, shades_of
 from lidarcore.mapping.walls import Walls, WallTable, along, distances, in_box, nearest
 
 from ...errors import NotFoundError
+from ...jobs.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite, Matrix, Pair
 from .dependencies import CurrentLandmarks, CurrentRuntime, Heavy
 from .examples import MEDIA_TYPES, ok
-from .landmarks import Metres, Region
+from .landmarks import USUAL, Limit, Metres, Region
 
 Mask = NDArray[np.bool_]
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422))
 
 NO_BUILDING = 'There is no map of whole scans: set navigation.mode to slam and navigation.method to "scans".'
+NO_SESSION = "No map is kept yet: wait for further scans, or give the session of one that is kept."
 NOT_YET = "The map of whole scans has no {} yet: wait for further scans."
 
 WALL = {
@@ -72,6 +74,15 @@ class WallJson(TypedDict):
 
 class WallsJson(TypedDict):
     walls: list[WallJson]
+
+
+class WallHistoryJson(TypedDict):
+    """`wall` is null if it is no longer in the map: its last state is the last of the history."""
+
+    session: int
+    wall: WallJson | None
+    history: list[WallJson]
+    next: float | None
 
 
 class NearestWallsJson(TypedDict):
@@ -159,6 +170,40 @@ def nearest_walls(
 
 
 @router.get(
+    "/walls/{id}/history",
+    response_model=WallHistoryJson,
+    responses=ok({"session": 3, "wall": WALL, "history": [WALL], "next": None}, "The wall") | documented(503),
+)
+def history(
+    landmarks: CurrentLandmarks,
+    id: int,
+    after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
+    limit: Limit = USUAL,
+    session: Annotated[
+        int | None, Query(description="which map; if not given the one that is written or used")
+    ] = None,
+) -> Response:
+    """One wall of a map that is kept, and what it was in each second in which it was seen, the oldest first.
+
+    So also of one that became part of another. It begins when three keyframes have seen the wall; 404 until then.
+    """
+    session = landmarks.session if session is None else session
+    if session is None:
+        raise NotFoundError(NO_SESSION)
+    wall_map = landmarks.atlas[session]
+    found = from_stored(wall_map.wall_history(id, after, limit))
+    present = from_stored([wall for wall in wall_map.walls() if wall.id == id])
+    return encode(
+        {
+            "session": session,
+            "wall": next(iter(_rows(present, range(len(present)))), None),
+            "history": _rows(found, range(len(found))),
+            "next": float(found.last_seen[-1]) if len(found) == limit else None,
+        }
+    )
+
+
+@router.get(
     "/map/grid",
     response_class=Response,
     responses={200: {"description": "The map", "content": {"image/png": {}, "application/zip": {}}}},
@@ -224,7 +269,7 @@ def _picture(runtime: Runtime) -> MapPicture:
     raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
 
 
-def _rows(walls: WallTable, chosen: list[int]) -> list[WallJson]:
+def _rows(walls: WallTable, chosen: Sequence[int]) -> list[WallJson]:
     columns = {
         "id": walls.ids.tolist(),
         "alpha": walls.alpha.tolist(),

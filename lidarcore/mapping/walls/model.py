@@ -58,7 +58,11 @@ class WallModel:
             count = len(full) // size
             blocks = full.reshape(count, size, count, size)
             found.append(blocks[np.arange(count), :, np.arange(count)])
-        return np.concatenate(found)
+        C = np.concatenate(found)
+        symmetric: Array = (
+            C + C.swapaxes(1, 2)
+        ) / 2  # rounding leaves the two halves apart, and only one is stored
+        return symmetric
 
     def ends_of(self, *walls: int) -> csr_array:
         """Rows (4 N, 4 W): x and y of both ends of walls, one after the other."""
