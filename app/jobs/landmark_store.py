@@ -13,7 +13,6 @@ from lidarcore.errors import LidarError, MapFileError, UnknownLandmarkError, Unk
 from lidarcore.landmarks import Atlas, LandmarkMap, Session
 from lidarcore.localization import Landmarks
 from lidarcore.localization import from_stored as landmarks_from_stored
-from lidarcore.mapping import MapPicture
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
@@ -105,9 +104,9 @@ class WallRun(_StoredRun):
 
     writer: WallWriter
 
-    def put(self, picture: MapPicture) -> None:
+    def put(self, grid: OccupancyGrid, walls: WallTable) -> None:
         """Write grid and confirmed walls as they are now, unless newer ones come first."""
-        self._put(partial(self.writer.write, picture))
+        self._put(partial(self.writer.write, grid, walls))
 
 
 class LandmarkStore:

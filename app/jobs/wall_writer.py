@@ -8,7 +8,7 @@ import numpy as np
 
 from lidarcore.errors import UnknownSessionError
 from lidarcore.landmarks import Atlas, LandmarkMap, StoredWall
-from lidarcore.mapping import MapPicture
+from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
 from .stored_grids import grid_to_stored
@@ -24,27 +24,27 @@ class WallWriter:
     def __init__(self, atlas: Atlas, source: str, mode: str) -> None:
         self._atlas, self._source, self._mode, self._started = atlas, source, mode, time.time()
         self._map: LandmarkMap | None = None
-        self._written: MapPicture | None = None
+        self._written: WallTable | None = None
 
     @property
     def session(self) -> int | None:
         """The id of the session; None before anything is on the disk."""
         return None if self._map is None else self._map.session
 
-    def write(self, picture: MapPicture, final: bool) -> None:
+    def write(self, grid: OccupancyGrid, walls: WallTable, final: bool) -> None:
         """Bring the disk up to date with the map, at the end of the run as before. Raises LandmarkMapError."""
-        confirmed = [] if picture.walls is None else to_stored(picture.walls)
-        if picture is self._written or (self._map is None and not confirmed):
+        confirmed = to_stored(walls)
+        if walls is self._written or (self._map is None and not confirmed):
             return
         if self._map is None:
             self._map = self._atlas.begin(self._source, self._started, self._mode)
         try:
             self._map.put_walls(confirmed)
-            self._map.put_grid(grid_to_stored(picture.grid))
+            self._map.put_grid(grid_to_stored(grid))
         except UnknownSessionError:
             self._map = self._written = None
             raise
-        self._written = picture
+        self._written = walls
 
     def end(self) -> None:
         """Note in the file that the run has ended. Raises LandmarkMapError."""

@@ -14,6 +14,7 @@ from lidarcore.geometry import check_covariance
 from lidarcore.localization import Landmarks, Navigator, as_pose
 from lidarcore.mapping import MapPicture, WholeScans
 from lidarcore.mapping.grid import OccupancyGrid
+from lidarcore.mapping.walls import WallTable
 
 from ..errors import ConflictError
 from ..sources.odometry_feed import OdometryFeed, OdometryStatus
@@ -35,8 +36,8 @@ NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."
 class WallRun(Protocol):
     """Where grid and walls of one run are kept."""
 
-    def put(self, picture: MapPicture) -> None:
-        """Keep them, and the grid, as they are now; returns at once."""
+    def put(self, grid: OccupancyGrid, walls: WallTable) -> None:
+        """Keep them as they are now; returns at once."""
 
 
 class MapStore(Protocol):

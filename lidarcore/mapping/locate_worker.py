@@ -139,7 +139,7 @@ class LocateWorker:
         query = query_of(scans, np.array(poses))
         state = self._verdict[0]
         if state in ("tracking", "coasting"):
-            self._follow(self._relocator.find_near(query, self._here))
+            self._follow(self._relocator.find_near(query, self._here), self._relocator)
         elif not waiting:
             found = self._relocator.find(query)
             if found.found:
@@ -148,7 +148,7 @@ class LocateWorker:
             else:
                 self._verdict = state, _WHY_NOT[found.verdict]
 
-    def _follow(self, near: Relocation) -> None:
+    def _follow(self, near: Relocation, relocator: Relocator) -> None:
         if near.found:
             self._here, self._misses = self._here.intersect(UncertainPose(near.pose, near.covariance)), 0
             is_far = np.hypot(*(self._local - self._begin)[:2]) >= _CONFIRMED
@@ -156,7 +156,7 @@ class LocateWorker:
             self._verdict = ("tracking", None) if self._is_confirmed else ("coasting", _ONCE)
             return
         self._verdict = "coasting", _NOT_SEEN
-        self._misses += near.against >= near.fit
+        self._misses += near.against > relocator.settings.against
         spread = np.sqrt(np.linalg.eigvalsh(self._here.covariance[:2, :2])[-1])
         if self._misses >= _MISSES or spread > _LOST or self._here.covariance[2, 2] > VAGUE**2:
             self._lose()

@@ -45,7 +45,7 @@ class MapWorker:
         self,
         settings: MapperSettings,
         extraction: ExtractionSettings,
-        keep: Callable[[MapPicture], None] | None = None,
+        keep: Callable[[OccupancyGrid, Walls], None] | None = None,
     ) -> None:
         self._keep = keep
         self.corrected = Corrected(np.zeros((1, 3)), np.zeros((3, 3)))
@@ -121,9 +121,9 @@ class MapWorker:
         self.picture = MapPicture(grid, self.picture.walls if self.picture else None)
         begin = time.monotonic()
         if begin >= self._next_walls:
-            self.picture = picture = MapPicture(grid, self._walls(grid))
+            self.picture = MapPicture(grid, walls := self._walls(grid))
             if self._keep:
-                self._keep(picture)
+                self._keep(grid, walls)
             end = time.monotonic()
             self._next_walls = end + _REST * (end - begin)
 

@@ -17,9 +17,11 @@ from lidarcore.localization.ekf.estimate import Instant, no_innovation
 from lidarcore.localization.tracking_result import State, goes_on
 from lidarcore.mapping.background import Background, MapPicture
 from lidarcore.mapping.front import FrontEnd, Tracked
+from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.locate_worker import LocateWorker
 from lidarcore.mapping.map_worker import MapWorker
 from lidarcore.mapping.settings import MapperSettings
+from lidarcore.mapping.walls import Walls
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
@@ -48,7 +50,7 @@ class WholeScans:
     def __init__(
         self,
         extraction: ExtractionSettings | None = None,
-        begin_map: Callable[[], Callable[[MapPicture], None]] | None = None,
+        begin_map: Callable[[], Callable[[OccupancyGrid, Walls], None]] | None = None,
         known: MapPicture | None = None,
         background: bool = True,
     ) -> None:

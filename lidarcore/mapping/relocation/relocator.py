@@ -31,7 +31,7 @@ class Relocation:
     covariance  (3, 3) of the pose
     fit         0 to 1: how well the points lie on what stands
     against     share of the rays that the map contradicts
-    rival       fit less `against` of the best other place, 0 if it is below what counts
+    rival       fit of the best other place that may be the true one, 0 if there is none
     """
 
     verdict: Verdict
@@ -54,9 +54,9 @@ class _Place(NamedTuple):
     against: float
     pose: Array
 
-    @property
-    def worth(self) -> float:
-        return self.fit - self.against
+
+def _worth(place: _Place) -> float:
+    return place.fit - place.against
 
 
 class Relocator:
@@ -129,21 +129,29 @@ class Relocator:
             pose = self._pose(angles, place)
             taken = np.vstack([taken, np.array([place], np.int32)])
             places.append(_Place(fit / full, self._against(query, pose), pose))
-            threshold = max(threshold, int(s.rival * full * max(one.worth for one in places)))
+            threshold = int(full * max(s.rival * max(places, key=_worth).fit, s.fit))
         return self._judged(query, places, against) if places else None
 
     def _judged(self, query: Query, places: list[_Place], against: float) -> Relocation:
         """The best of the places at which the points fit, and whether it stands alone."""
         s = self.settings
-        best, *others = sorted(places, key=lambda one: -one.worth)
-        rival = max((one.worth for one in others), default=0.0)
+        best = max(places, key=_worth)
+        rivals = [
+            other.fit
+            for other in places
+            if other is not best
+            and other.fit >= s.rival * best.fit
+            and other.against <= best.against + s.against
+        ]
         verdict: Verdict = "found"
-        if best.worth < s.fit or best.against > against:
+        if _worth(best) < s.fit or best.against > against:
             verdict = "no fit"
-        elif rival >= s.rival * best.worth or len(places) == _MOST_PLACES:
+        elif rivals or len(places) == _MOST_PLACES:
             verdict = "several places"
         pose, covariance = refined(self._field, query.points / self._grid.resolution, best.pose)
-        return Relocation(verdict, *self._in_world(pose, covariance), best.fit, best.against, rival)
+        return Relocation(
+            verdict, *self._in_world(pose, covariance), best.fit, best.against, max(rivals, default=0.0)
+        )
 
     def _as_guessed(self, query: Query, at: Array) -> Relocation:
         """How well a pose (3,) in cells of the field fits, which is not found."""
