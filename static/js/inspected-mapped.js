@@ -2,7 +2,7 @@
 
 import { request } from "./api.js";
 import { earlierFigure } from "./earlier.js";
-import { direction, mappedOf, mappedWall, selectedMapped, selectMapped, slant } from "./mapped.js";
+import { direction, mappedWall, seenOf, selectedMapped, selectMapped, slant } from "./mapped.js";
 import { selectWall } from "./selected-wall.js";
 import { get, on, set } from "./store.js";
 import { throttled } from "./throttle.js";
@@ -61,10 +61,9 @@ function waysAround({ id }) {
 }
 
 /** To what the scan sees of it. */
-function wayToScan(frame, { id }) {
-  const seen = (frame.segments[frame.methods[0]] ?? []).filter((wall) => mappedOf(frame, wall)?.id === id);
-  const [longest] = seen.sort((a, b) => b.length - a.length);
-  return longest ? [["In this scan", () => selectWall(frame, longest)]] : [];
+function wayToScan(frame, wall) {
+  const seen = seenOf(frame, wall);
+  return seen ? [["In this scan", () => selectWall(frame, seen)]] : [];
 }
 
 /** Asks for the history of the selected wall, anew while it changes. */

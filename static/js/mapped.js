@@ -36,15 +36,30 @@ export const mappedWall = (id) => get("mapped").walls.find((wall) => wall.id ===
 export const isMapFirst = () => get("panel") === "map";
 
 /** The wall of the map that a wall of a frame is part of, if it is of one. */
-export function mappedOf({ localization }, { start, end }) {
-  const [a, b] = [start, end].map(placer(localization?.pose));
-  const middle = [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2];
-  const facing = direction({ ends: [a, b] });
-  return get("mapped")
-    .walls.filter((wall) => Math.abs(Math.cos(direction(wall) - facing)) > ALIGNED)
-    .map((wall) => ({ wall, away: distance(middle, nearestOn(wall.ends, middle)) }))
-    .filter(({ away }) => away < AWAY_M)
-    .sort((one, other) => one.away - other.away)[0]?.wall;
+export function mappedOf(frame, wall) {
+  const spot = spotOf(frame, wall);
+  const near = get("mapped").walls.map((whole) => ({ whole, away: awayFrom(whole, spot) }));
+  return near.filter(({ away }) => away < AWAY_M).sort((one, other) => one.away - other.away)[0]?.whole;
+}
+
+/** The longest wall of a frame, by its main method, that is part of a wall of the map, if it sees it. */
+export function seenOf(frame, whole) {
+  const near = (frame.segments[frame.methods[0]] ?? []).filter((wall) => awayFrom(whole, spotOf(frame, wall)) < AWAY_M);
+  const seen = near.filter((wall) => mappedOf(frame, wall) === whole); // one beside it may be nearer
+  return seen.sort((one, other) => other.length - one.length)[0];
+}
+
+/** The middle of a wall of a frame, and in which direction it runs, in the world. */
+function spotOf({ localization }, { start, end }) {
+  const ends = [start, end].map(placer(localization?.pose));
+  return { at: [0, 1].map((axis) => (ends[0][axis] + ends[1][axis]) / 2), runs: direction({ ends }) };
+}
+
+/** How far a spot is from a wall, m; Infinity if that runs elsewhere. */
+function awayFrom(whole, { at, runs }) {
+  const [x, y] = nearestOn(whole.ends, at);
+  const isAlong = Math.abs(Math.cos(direction(whole) - runs)) > ALIGNED;
+  return isAlong ? Math.hypot(x - at[0], y - at[1]) : Infinity;
 }
 
 /** In which direction a wall runs from its first end, which has its free side on the left, rad. */
@@ -52,5 +67,3 @@ export const direction = ({ ends: [[x0, y0], [x1, y1]] }) => Math.atan2(y1 - y0,
 
 /** The same either way, from 0 to pi. */
 export const slant = (wall) => (direction(wall) + 2 * Math.PI) % Math.PI;
-
-const distance = ([x0, y0], [x1, y1]) => Math.hypot(x1 - x0, y1 - y0);

@@ -105,7 +105,7 @@ function row({ id, source, mode, started, landmarks, walls, grid }, live) {
   );
   if (isUsed) button.setAttribute("aria-current", "true");
   const about = [source, mode === "import" ? "loaded" : null, moment(started)].filter(Boolean).join(", ");
-  const lost = walls || grid ? holds : `${holds} and their history`;
+  const lost = grid && !walls ? holds : `${holds} and their history`;
   const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, lost));
   return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
 }

@@ -179,3 +179,28 @@ def test_a_finger_selects_a_wall_of_the_map(look: Callable[..., Visitor], mapped
     found = card(visitor, wall)
     found.get_by_role("button", name="Close the inspector").click()
     expect(found).to_be_hidden()
+
+
+def test_a_saved_view_shows_the_walls_of_the_map(look: Callable[..., Visitor], mapped: Server) -> None:
+    visitor = look()
+    colour = visitor.page.evaluate("import('/static/js/chart.js').then(({ token }) => token('--wall'))")
+    with visitor.page.expect_download() as saved:
+        visitor.page.locator("#save-svg").click()
+    paths = re.findall(rf'<path d="([^"]+)" stroke="{re.escape(colour)}"', saved.value.path().read_text())
+    assert len(set(paths)) == len(walls(mapped))
+
+
+def test_with_the_map_its_walls_and_their_card_go(look: Callable[..., Visitor], mapped: Server) -> None:
+    """The last test: the map is given up."""
+    visitor, wall = look(), seen_often(mapped)[0]
+    visitor.page.get_by_role("button", name=f"W{wall['id']}", exact=True).click()
+    found = card(visitor, wall)
+    mapped.patch("settings", {"navigation": {"mode": "off"}})
+    expect(found).to_be_hidden()
+    wait_until(lambda: visitor.knows("mapped") == {"walls": [], "corners": []}, "no wall is known")
+    assert visitor.knows("mappedWall") is None, (
+        "the next map counts from zero: its wall of that number is another"
+    )
+    visitor.page.mouse.move(*visitor.pixel_at(off_middle(wall)))
+    visitor.page.wait_for_timeout(300)
+    assert "of the map" not in visitor.page.locator("#hover").inner_text()
