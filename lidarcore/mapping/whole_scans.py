@@ -111,6 +111,10 @@ class WholeScans:
         here = self._located(tracked)
         self._reckon(scan, here.pose)
         state, why = self._background.judge(tracked, here)
+        if self._is_nowhere and state != "starting":  # found: odometry is compared from here on
+            self._reckoning.interrupt()
+            self._reckoning.place(here.pose)
+        self._is_nowhere = state == "starting"
         return self._result(tracked.stamp, state, message or why, here)
 
     def _removed(self, scan: Scan) -> Array:
@@ -131,6 +135,7 @@ class WholeScans:
         self._background = self._begun()
         self._ways: list[UncertainPose] = []  # to each keyframe from the one before it
         self._tie = _HERE  # T_keyframe_sensor
+        self._is_nowhere = False
         self._last = self._velocity = None
 
     def _begun(self) -> Background:
