@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -12,6 +11,8 @@ from lidarcore.clusters import cluster
 from lidarcore.files import replacing, write
 from lidarcore.landmarks import FORMATS, read_landmarks, write_landmarks
 from lidarcore.localization import Landmarks, Navigator, TrackingResult, from_stored, to_stored
+from lidarcore.mapping import MapPicture, WholeScans
+from lidarcore.mapping.grid import read_ros_map
 from lidarcore.recordings import Recording
 
 from ..pipeline.settings import Settings
@@ -25,29 +26,37 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a recording gave: columns of the poses, how many scans, how many of them tracked, and the map."""
+    """What a recording gave: columns of the poses, how many scans, how many of them tracked, and landmarks, if any."""
 
     columns: dict[str, list[object]]
     scans: int
     tracked: int
-    landmarks: Landmarks
+    landmarks: Landmarks | None
 
 
-def localize(
-    recording: Recording, known: Landmarks | None, settings: Settings, progress: Callable[[int], None]
+def track(
+    recording: Recording, tracker: Navigator | WholeScans, settings: Settings, progress: Callable[[int], None]
 ) -> Outcome:
-    """Localize in a known map, or build one by SLAM; `progress` is told the number of scans. Raises RecordingError."""
-    mode: Literal["localize", "slam"] = "slam" if known is None else "localize"
-    navigator = Navigator(replace(settings.navigation, mode=mode), known)
+    """Take all scans of a recording; `progress` is told the number of scans. Raises RecordingError."""
     columns: dict[str, list[object]] = {name: [] for name in COLUMNS}
     tracked = 0
     for number, scan in enumerate(recording, 1):
-        found = _step(navigator, scan, settings)
+        found = _step(tracker, scan, settings)
         for name, value in zip(COLUMNS, _row(found), strict=True):
             columns[name].append(value)
         tracked += found.state == "tracking"
         progress(number)
-    return Outcome(columns, len(columns["stamp"]), tracked, navigator.landmarks)
+    landmarks = tracker.landmarks if isinstance(tracker, Navigator) else None
+    return Outcome(columns, len(columns["stamp"]), tracked, landmarks)
+
+
+def tracker_in(path: Path | None, settings: Settings) -> Navigator | WholeScans:
+    """What localizes in the map of a file, or builds one by SLAM. Raises MapFileError, LandmarkMapError or OSError."""
+    if path is None:
+        return Navigator(replace(settings.navigation, mode="slam"))
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return WholeScans(settings.extraction, known=MapPicture(read_ros_map(path)), background=False)
+    return Navigator(replace(settings.navigation, mode="localize"), read_map(path))
 
 
 def read_map(path: Path) -> Landmarks:
@@ -77,10 +86,12 @@ def format_of(path: Path) -> str:
     return name
 
 
-def _step(navigator: Navigator, scan: Scan, settings: Settings) -> TrackingResult:
-    scan = navigator.deskewed(scan)
+def _step(tracker: Navigator | WholeScans, scan: Scan, settings: Settings) -> TrackingResult:
+    scan = tracker.deskewed(scan)
+    if isinstance(tracker, WholeScans):
+        return tracker.step(scan)
     features = extract(scan, settings.extraction)
-    return navigator.step(scan, features, cluster(scan, settings.clusters) if settings.clustered else None)
+    return tracker.step(scan, features, cluster(scan, settings.clusters) if settings.clustered else None)
 
 
 def _row(found: TrackingResult) -> tuple[object, ...]:

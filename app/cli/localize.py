@@ -14,7 +14,10 @@ def localize(
     known: Annotated[
         Path | None,
         typer.Option(
-            "--map", metavar="FILE", help="to localize in: .json, .csv, .geojson; without, SLAM builds one"
+            "--map",
+            metavar="FILE",
+            help="to localize in: landmarks (.json, .csv, .geojson) or a grid (.yaml, as ROS and `lidarcore map` write "
+            "it); without, SLAM builds one",
         ),
     ] = None,
     save_map: Annotated[
@@ -27,23 +30,22 @@ def localize(
     settings: SettingsFile = None,
     set_: Set = None,
 ) -> None:
-    """Track the sensor through a recording by landmarks, in a known map or in one that is built on the way."""
+    """Track the sensor through a recording, in a known map or in one of landmarks that is built on the way."""
     if known is not None and save_map is not None:
         raise typer.BadParameter("give --map or --save-map: a known map stays as it is.")
     from lidarcore import open_recording
 
-    from .localization_run import format_of, read_map, write_map, write_poses
-    from .localization_run import localize as run
+    from .localization_run import format_of, track, tracker_in, write_map, write_poses
 
     chosen = settings_from(settings, set_)
-    landmarks = None if known is None else read_map(known)
+    tracker = tracker_in(known, chosen)
     if save_map is not None:
         format_of(save_map)
     with counting("scans") as count:
-        outcome = run(open_recording(recording, topic, chosen.sensor.mask), landmarks, chosen, count)
+        outcome = track(open_recording(recording, topic, chosen.sensor.mask), tracker, chosen, count)
     if output is not None:
         write_poses(output, outcome)
-    if save_map is not None:
+    if save_map is not None and outcome.landmarks is not None:
         write_map(save_map, outcome.landmarks, chosen.landmark_method)
-    confirmed = int(outcome.landmarks.confirmed.sum())
-    typer.echo(f"{outcome.scans} scans, {outcome.tracked} of them tracked; {confirmed} landmarks.")
+    found = "" if outcome.landmarks is None else f"; {int(outcome.landmarks.confirmed.sum())} landmarks"
+    typer.echo(f"{outcome.scans} scans, {outcome.tracked} of them tracked{found}.")

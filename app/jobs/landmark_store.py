@@ -13,11 +13,13 @@ from lidarcore.errors import LidarError, MapFileError, UnknownLandmarkError, Unk
 from lidarcore.landmarks import Atlas, LandmarkMap, Session
 from lidarcore.localization import Landmarks
 from lidarcore.localization import from_stored as landmarks_from_stored
+from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
 from ..threads import join
-from .map_file import landmarks_of
+from .map_file import grid_of, landmarks_of
 from .map_writer import MapChange, MapWriter
+from .stored_grids import grid_from_stored, grid_to_stored
 from .wall_writer import WallWriter, from_stored
 
 PATIENCE = 2.0  # s to wait while another process writes
@@ -102,9 +104,9 @@ class WallRun(_StoredRun):
 
     writer: WallWriter
 
-    def put(self, walls: WallTable) -> None:
-        """Write the confirmed walls as they are now, unless newer ones come first."""
-        self._put(partial(self.writer.write, walls))
+    def put(self, grid: OccupancyGrid, walls: WallTable) -> None:
+        """Write grid and confirmed walls as they are now, unless newer ones come first."""
+        self._put(partial(self.writer.write, grid, walls))
 
 
 class LandmarkStore:
@@ -194,18 +196,27 @@ class LandmarkStore:
         """The map of a session to localize in, with the ids of the file. Raises UnknownSessionError."""
         return landmarks_from_stored(self.atlas[session])
 
-    def load(self, path: Path, format: str, name: str) -> Session:
-        """A file of a map (one of FORMATS) as a session of its own. Raises MapFileError; nothing is kept of it then.
+    def grid(self, session: int) -> OccupancyGrid | None:
+        """The grid that a session has. Raises UnknownSessionError, or MapFileError if it is damaged."""
+        stored = self.atlas[session].grid()
+        return None if stored is None else grid_from_stored(stored)
 
+    def load(self, path: Path, format: str, name: str) -> Session:
+        """A file of a map as a session of its own: landmarks in one of FORMATS, or a "zip" of a grid as ROS has it.
+
+        Raises MapFileError or GridError; nothing is kept of it then.
         So also for a file without landmarks: as the newest map it would be the one that is asked.
         """
-        found = landmarks_of(path, format)
-        if not found:
+        grid = grid_of(path) if format == "zip" else None
+        found = [] if grid else landmarks_of(path, format)
+        if not (grid or found):
             raise MapFileError(f"This {format} holds no landmarks: export a map that has some.")
         now = time.time()
-        session = self.atlas.begin(name, now, "import", found).session
-        self.atlas.end(session, now)
-        return self.atlas.session(session)
+        loaded = self.atlas.begin(name, now, "import", found)
+        if grid:
+            loaded.put_grid(grid_to_stored(grid))
+        self.atlas.end(loaded.session, now)
+        return self.atlas.session(loaded.session)
 
     def is_built(self, session: int) -> bool:
         """Whether SLAM built the map of a session, in a frame of its own. Raises UnknownSessionError."""
@@ -216,9 +227,8 @@ class LandmarkStore:
         return self._run is not None and self._run.session == session
 
     def newest(self) -> int | None:
-        """The newest session that has landmarks."""
-        found = self.atlas.newest()
-        return found.session if found else None
+        """The newest session to localize in."""
+        return self.atlas.newest_to_localize_in()
 
     def _schedule(self, run: _StoredRun, newest: _Waiting) -> None:
         """Have the newest map of a run written in its turn; that the run has ended is not forgotten."""

@@ -1,17 +1,23 @@
-"""A file of landmarks that somebody sent, read in a process of its own."""
+"""A map that somebody sent, read in a process of its own."""
 
+import tempfile
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from zipfile import BadZipFile, ZipFile
 
 from lidarcore.errors import MapFileError
 from lidarcore.landmarks import Landmark, read_landmarks
+from lidarcore.mapping.grid import OccupancyGrid, read_ros_map
 
 from ..isolation import Isolated
 
 MOST = 250_000  # landmarks, which take 100 MB; a house has some hundred
+_YAMLS = (".yaml", ".yml")
+_PARTS = (*_YAMLS, ".pgm", ".png", ".bmp")
+_MOST_PARTS, _MOST_BYTES = 20, 200_000_000  # of a zip, unpacked
 _TOGETHER = 1000  # landmarks that come over at a time
 
 
@@ -24,6 +30,36 @@ def landmarks_of(path: Path, format: str) -> list[Landmark]:
             if len(found) > MOST:
                 raise MapFileError(f"This {format} holds more than {MOST} landmarks: load a part of it.")
     return found
+
+
+def grid_of(path: Path) -> OccupancyGrid:
+    """The grid of a zip with a YAML and its image, as ROS has them. Raises MapFileError or GridError."""
+    with closing(Isolated("the map", MapFileError, _read_grid, path)) as reading:
+        return next(iter(reading))
+
+
+def _read_grid(path: Path) -> Iterator[OccupancyGrid]:
+    with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder:
+        yield read_ros_map(_unpacked(path, Path(folder)))
+
+
+def _unpacked(path: Path, folder: Path) -> Path:
+    """The only YAML of a zip, unpacked with the images into a folder; other files stay where they are."""
+    try:
+        with ZipFile(path) as archive:
+            parts = [part for part in archive.infolist() if Path(part.filename).suffix.lower() in _PARTS]
+            yamls = [part for part in parts if Path(part.filename).suffix.lower() in _YAMLS]
+            if len(yamls) != 1:
+                raise MapFileError(
+                    f"This zip holds {len(yamls)} YAML files: pack one with its image, as ROS has them."
+                )
+            if len(parts) > _MOST_PARTS or sum(part.file_size for part in parts) > _MOST_BYTES:
+                raise MapFileError(
+                    f"This zip holds more than {_MOST_PARTS} files or {_MOST_BYTES} bytes: pack one map."
+                )
+            return [Path(archive.extract(part, folder)) for part in (*parts, *yamls)][-1]
+    except (BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
+        raise MapFileError(f"This is no zip that can be read: {error}.") from error
 
 
 def _read(path: Path, format: str) -> Iterator[list[Landmark]]:

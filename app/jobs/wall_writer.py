@@ -1,4 +1,4 @@
-"""What of the walls of a running map is on the disk: those that were seen often enough, all anew each time."""
+"""What of a running map of whole scans is on the disk: its grid, and the walls that were seen often enough."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -8,13 +8,16 @@ import numpy as np
 
 from lidarcore.errors import UnknownSessionError
 from lidarcore.landmarks import Atlas, LandmarkMap, StoredWall
+from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
+
+from .stored_grids import grid_to_stored
 
 CONFIRMED = 3  # keyframes that saw a wall; what fewer saw may have been somebody who stood there
 
 
 class WallWriter:
-    """Writes the confirmed walls of one run into a session of their own, which begins with the first of them."""
+    """Writes the grid and the confirmed walls of one run into a session of their own, which begins with the first."""
 
     ids: Mapping[int, int] = MappingProxyType({})  # of landmarks: it has none
 
@@ -28,7 +31,7 @@ class WallWriter:
         """The id of the session; None before anything is on the disk."""
         return None if self._map is None else self._map.session
 
-    def write(self, walls: WallTable, final: bool) -> None:
+    def write(self, grid: OccupancyGrid, walls: WallTable, final: bool) -> None:
         """Bring the disk up to date with the map, at the end of the run as before. Raises LandmarkMapError."""
         confirmed = to_stored(walls)
         if walls is self._written or (self._map is None and not confirmed):
@@ -37,6 +40,7 @@ class WallWriter:
             self._map = self._atlas.begin(self._source, self._started, self._mode)
         try:
             self._map.put_walls(confirmed)
+            self._map.put_grid(grid_to_stored(grid))
         except UnknownSessionError:
             self._map = self._written = None
             raise

@@ -11,8 +11,9 @@ from lidarcore import Array, Features, Scan
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LandmarkMapError
 from lidarcore.geometry import check_covariance
-from lidarcore.localization import Landmarks, NavigationSettings, Navigator, as_pose
+from lidarcore.localization import Landmarks, Navigator, as_pose
 from lidarcore.mapping import MapPicture, WholeScans
+from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
 from ..errors import ConflictError
@@ -33,9 +34,9 @@ NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."
 
 
 class WallRun(Protocol):
-    """Where the walls of one run are kept."""
+    """Where grid and walls of one run are kept."""
 
-    def put(self, walls: WallTable) -> None:
+    def put(self, grid: OccupancyGrid, walls: WallTable) -> None:
         """Keep them as they are now; returns at once."""
 
 
@@ -52,7 +53,10 @@ class MapStore(Protocol):
         """No map is built any more; that of a session is used, if one is given."""
 
     def newest(self) -> int | None:
-        """The newest session that has landmarks."""
+        """The newest session to localize in."""
+
+    def grid(self, session: int) -> OccupancyGrid | None:
+        """The grid of a session, if it has one. Raises LandmarkMapError."""
 
     def landmarks(self, session: int) -> Landmarks:
         """The map of a session. Raises UnknownSessionError."""
@@ -63,9 +67,10 @@ class MapStore(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LocalizationStatus:
-    """`session` is built or localized in; `map` was chosen to localize in, null for the newest with landmarks."""
+    """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what."""
 
     mode: Literal["off", "localize", "slam"]
+    method: Literal["scans", "landmarks"] | None
     session: int | None
     map: int | None
     problem: str | None
@@ -91,8 +96,14 @@ class Navigation:
         return run.session if run else None
 
     @property
+    def method(self) -> Literal["scans", "landmarks"] | None:
+        """What tells the pose; None before the first scan of a run."""
+        run = self._run
+        return None if run is None else "scans" if isinstance(run.navigator, WholeScans) else "landmarks"
+
+    @property
     def map(self) -> int | None:
-        """The session chosen to localize in; None for the newest with landmarks."""
+        """The session chosen to localize in; None for the newest."""
         return self._map
 
     @property
@@ -114,9 +125,9 @@ class Navigation:
         return run.picture if run else None
 
     def choose_map(self, session: int | None) -> None:
-        """Localize in the landmarks of that session. Raises UnknownSessionError."""
+        """Localize in the map of that session. Raises UnknownSessionError."""
         if session is not None:
-            self._store.landmarks(session)
+            self._store.is_built(session)
         with self._lock:
             self._map = session
             if self._run and self._run.known is not None:
@@ -197,7 +208,7 @@ class Navigation:
             written = self._store.begin(timed.name, replay=replay)
             self._run = Run(timed.source, wanted, Navigator(wanted), written, None, Trails(own_frame=True))
         elif wanted.mode == "localize":
-            self._run = self._localizing(timed, wanted)
+            self._run = self._localizing(timed, settings)
         else:
             self._store.use(None)
         if self._run and self._placed:
@@ -205,16 +216,26 @@ class Navigation:
             self._placed = None
         return self._run
 
-    def _localizing(self, timed: TimedScan, wanted: NavigationSettings) -> Run | None:
+    def _localizing(self, timed: TimedScan, settings: Settings) -> Run | None:
         session = self._map if self._map is not None else self._store.newest()
         self._store.use(session)
+        if session is None:
+            self.problem = NO_MAP
+            return None
         try:
-            known = self._store.landmarks(session) if session is not None else ()
-            if session is None or not known:
-                self.problem = NO_MAP
-                return None
+            navigator = self._navigator_in(session, settings)
             own_frame = self._store.is_built(session)
         except LandmarkMapError as error:  # deleted meanwhile, or the file cannot be read
             self.problem = str(error)
             return None
-        return Run(timed.source, wanted, Navigator(wanted, known), None, session, Trails(own_frame))
+        if navigator is None:
+            self.problem = NO_MAP
+            return None
+        return Run(timed.source, settings.navigation, navigator, None, session, Trails(own_frame))
+
+    def _navigator_in(self, session: int, settings: Settings) -> Navigator | WholeScans | None:
+        """What localizes in the map of a session: whole scans if it has a grid, else landmarks, if there are any."""
+        if (grid := self._store.grid(session)) is not None:
+            return WholeScans(settings.extraction, known=MapPicture(grid))
+        known = self._store.landmarks(session)
+        return Navigator(settings.navigation, known) if known else None

@@ -113,6 +113,7 @@ class Runtime:
         """What is localized, and in which map."""
         return LocalizationStatus(
             mode=self.settings.navigation.mode,
+            method=self.navigation.method,
             session=self.navigation.session,
             map=self.navigation.map,
             problem=self.navigation.problem,

@@ -69,14 +69,14 @@ class Run:
 
     @property
     def picture(self) -> MapPicture | None:
-        """Grid and walls of the map that whole scans make."""
+        """Grid and walls of the map that whole scans make, or are localized in."""
         return self.navigator.picture if isinstance(self.navigator, WholeScans) else None
 
     @property
     def paths(self) -> Paths:
-        """Where the sensor has been; in a map of whole scans as it has been bent since."""
+        """Where the sensor has been; in a map that whole scans make as it has been bent since."""
         paths = self.trails.paths()
-        if not isinstance(self.navigator, WholeScans):
+        if self.known is not None or not isinstance(self.navigator, WholeScans):
             return paths
         return replace(paths, estimated=self.navigator.path())
 

@@ -1,4 +1,4 @@
-"""Newest wins: each client of the stream has room for one state and one frame, and never gets an old one."""
+"""Newest wins: each client of the stream has room for one state, the walls and one frame, and never gets an old one."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,6 +10,7 @@ from pydantic_core import to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lidarcore.errors import LocalizationError
+from lidarcore.mapping.walls import Walls
 
 from ..errors import explained
 from ..jobs.landmark_store import LandmarkStore
@@ -20,6 +21,7 @@ from ..pipeline.runtime import Runtime
 from .map_changes import MapChanges
 from .schemas import OdometryPose
 from .serializers import frame_text
+from .wall_json import walls_text
 
 TICK = 0.5  # s
 PENALTY = 0.01  # s until the next message is read of a client whose last one was not taken
@@ -39,6 +41,7 @@ class Mailbox:
         self._news = asyncio.Event()
         self._state_changed = False
         self._frame: Frame | None = None
+        self._walls: str | None = None
         self._changes = MapChanges()
 
     def put_change(self, change: MapChange) -> None:
@@ -47,6 +50,10 @@ class Mailbox:
 
     def put_state(self) -> None:
         self._state_changed = True
+        self._news.set()
+
+    def put_walls(self, text: str) -> None:
+        self._walls = text
         self._news.set()
 
     def put_frame(self, frame: Frame) -> None:
@@ -59,10 +66,13 @@ class Mailbox:
         self._news.clear()
         changed, self._state_changed = self._state_changed, False
         frame, self._frame = self._frame, None
+        walls, self._walls = self._walls, None
         messages = [state()] if changed else []
         if self._changes:
             changes, self._changes = self._changes, MapChanges()
             messages.append(_message("landmarks", changes.text()))
+        if walls is not None:
+            messages.append(_message("walls", walls))
         if frame is not None:
             messages.append(_message("frame", frame_text(frame, self._points)))
         return messages, frame
@@ -83,7 +93,8 @@ class Hub:
         self._mailboxes: set[Mailbox] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._session: int | None = None  # that was written to last
-        runtime.frame_listeners.append(lambda frame: self._post(Mailbox.put_frame, frame))
+        self._walls: Walls | None = None  # of the map that the newest frame shows
+        runtime.frame_listeners.append(self._shown)
         landmarks.listeners.append(self._written)
         runtime.change_listeners.append(lambda: self._post(Mailbox.put_state))
 
@@ -117,8 +128,10 @@ class Hub:
         """Feed one accepted client until it goes."""
         mailbox = Mailbox(points)
         mailbox.put_state()
-        if self._runtime.frame is not None:
-            mailbox.put_frame(self._runtime.frame)
+        if (newest := self._runtime.frame) is not None:
+            mailbox.put_frame(newest)
+            if (walls := _walls_of(newest)) is not None:
+                mailbox.put_walls(walls_text(walls))
         self._mailboxes.add(mailbox)
         sender = asyncio.create_task(self._send(websocket, mailbox))
         receiver = asyncio.create_task(self._receive(websocket))
@@ -164,6 +177,13 @@ class Hub:
             if self._runtime.player.source.live or self._recorder.running:
                 self._deliver(Mailbox.put_state)
 
+    def _shown(self, frame: Frame) -> None:
+        """The walls of its map are other ones about once a second; they are told of only then, before the frame."""
+        if (walls := _walls_of(frame)) is not self._walls:
+            self._walls = walls
+            self._post(Mailbox.put_walls, walls_text(walls))
+        self._post(Mailbox.put_frame, frame)
+
     def _written(self, change: MapChange) -> None:
         """A map is told of first when its first landmark is on the disk: only now it has a session."""
         if change.session != self._session:
@@ -179,6 +199,10 @@ class Hub:
     def _deliver(self, put: Callable[..., None], *args: object) -> None:
         for mailbox in self._mailboxes:
             put(mailbox, *args)
+
+
+def _walls_of(frame: Frame) -> Walls | None:
+    return frame.picture.walls if frame.picture else None
 
 
 def _refusal(detail: str) -> str:

@@ -13,9 +13,13 @@ from lidarcore.geometry.se2 import (
     compose_jacobians,
     inverse,
     inverse_jacobian,
+    pose_difference,
     relative,
     relative_jacobians,
+    wrap,
 )
+
+_WEIGHTS = np.linspace(0.0, 1.0, 101)[:, None, None]
 
 
 class UncertainPose(NamedTuple):
@@ -33,6 +37,18 @@ class UncertainPose(NamedTuple):
     def inverse(self) -> "UncertainPose":
         """T_b_a."""
         return UncertainPose(inverse(self.pose), _carried(inverse_jacobian(self.pose), self.covariance))
+
+    def intersect(self, other: "UncertainPose") -> "UncertainPose":
+        """One estimate from two of the same pose, however their errors depend on each other.
+
+        Covariance intersection [Julier and Uhlmann 1997] with the weight of the least determinant.
+        """
+        A, B = np.linalg.inv(self.covariance), np.linalg.inv(other.covariance)
+        sums = _WEIGHTS * A + (1 - _WEIGHTS) * B
+        best = int(np.argmax(np.linalg.slogdet(sums)[1]))
+        covariance, weight = np.linalg.inv(sums[best]), float(_WEIGHTS[best, 0, 0])
+        pose = self.pose + (1 - weight) * covariance @ B @ pose_difference(other.pose, self.pose)
+        return UncertainPose(np.array([*pose[:2], wrap(pose[2])]), (covariance + covariance.T) / 2)
 
     def relative(self, T_a_c: "UncertainPose") -> "UncertainPose":
         """T_b_c of poses in one frame with independent errors."""

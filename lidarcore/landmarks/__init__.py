@@ -7,6 +7,7 @@ from lidarcore.landmarks.landmark_map import LandmarkMap
 from lidarcore.landmarks.nearest import Metric, Neighbour
 from lidarcore.landmarks.picture import export_picture
 from lidarcore.landmarks.queries import Box, Circle, Filter, Page
+from lidarcore.landmarks.stored_grid import StoredGrid
 from lidarcore.landmarks.wall import StoredWall
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "Neighbour",
     "Page",
     "Session",
+    "StoredGrid",
     "StoredWall",
     "export_map",
     "export_picture",

@@ -1,8 +1,9 @@
 """The file of maps: one for each session, since every run of SLAM has a world frame of its own."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from lidarcore.errors import UnknownLandmarkError, UnknownSessionError
 from lidarcore.landmarks.database import PATIENCE, Database, path_of
@@ -13,7 +14,8 @@ from lidarcore.landmarks.wall_store import forget_walls
 
 _SESSIONS = """SELECT id, source, mode, started, ended,
     (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id),
-    (SELECT count(*) FROM walls WHERE walls.session = sessions.id) FROM sessions"""
+    (SELECT count(*) FROM walls WHERE walls.session = sessions.id),
+    EXISTS (SELECT 1 FROM grids WHERE grids.session = sessions.id) FROM sessions"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,7 @@ class Session:
     started, ended  s since 1970, by the computer's clock; `ended` None while it runs or if it was killed
     landmarks       how many there are
     walls           likewise
+    grid            whether there is an occupancy grid
     """
 
     id: int
@@ -33,6 +36,7 @@ class Session:
     ended: float | None
     landmarks: int
     walls: int = 0
+    grid: bool = False
 
 
 class Atlas:
@@ -82,7 +86,7 @@ class Atlas:
     def sessions(self) -> list[Session]:
         """All sessions, the oldest first."""
         with self._database.reading() as connection:
-            return [Session(*row) for row in connection.execute(f"{_SESSIONS} ORDER BY id")]
+            return [_session(row) for row in connection.execute(f"{_SESSIONS} ORDER BY id")]
 
     def session(self, id: int) -> Session:
         """One session; raises UnknownSessionError."""
@@ -90,7 +94,7 @@ class Atlas:
             row = connection.execute(f"{_SESSIONS} WHERE id = ?", (id,)).fetchone()
         if row is None:
             raise _unknown(id)
-        return Session(*row)
+        return _session(row)
 
     def __getitem__(self, session: int) -> LandmarkMap:
         """The map of a session; raises UnknownSessionError."""
@@ -105,6 +109,14 @@ class Atlas:
         with self._database.reading() as connection:
             (session,) = connection.execute(query).fetchone()
         return None if session is None else LandmarkMap(self._database, session)
+
+    def newest_to_localize_in(self) -> int | None:
+        """The newest session that has landmarks or a grid; None if there is none."""
+        query = """SELECT max(id) FROM sessions WHERE
+            id IN (SELECT session FROM extents) OR id IN (SELECT session FROM grids)"""
+        with self._database.reading() as connection:
+            (session,) = connection.execute(query).fetchone()
+        return None if session is None else int(session)
 
     def holding(self, landmark: int) -> LandmarkMap:
         """The map that holds, or held, the landmark with this id; raises UnknownLandmarkError."""
@@ -126,7 +138,8 @@ class Atlas:
         with self._database.writing() as connection:
             if not connection.execute("DELETE FROM sessions WHERE id = ?", (session,)).rowcount:
                 raise _unknown(session)
-            connection.execute("DELETE FROM walls WHERE session = ?", (session,))
+            for table in ("walls", "grids"):
+                connection.execute(f"DELETE FROM {table} WHERE session = ?", (session,))
         with self._database.reading() as connection:
             left = connection.execute(
                 """SELECT session FROM (SELECT session FROM extents UNION SELECT session FROM wall_history)
@@ -136,6 +149,10 @@ class Atlas:
         for id in gone:
             purge(self._database, id)
             forget_walls(self._database, id)
+
+
+def _session(row: tuple[Any, ...]) -> Session:
+    return replace(Session(*row), grid=bool(row[-1]))
 
 
 def _unknown(session: int) -> UnknownSessionError:

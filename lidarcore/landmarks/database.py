@@ -103,6 +103,12 @@ _MIGRATIONS: tuple[tuple[str, ...], ...] = (
             var_alpha, cov_alpha_r, var_r, x1, y1, x2, y2, length, var_length,
             ended_1, ended_2, corner_1, corner_2, first_seen, last_seen, count FROM walls""",
     ),
+    (  # an occupancy grid stands there, too
+        """CREATE TABLE grids (
+            session INTEGER PRIMARY KEY, resolution REAL NOT NULL,
+            x REAL NOT NULL, y REAL NOT NULL, heading REAL NOT NULL,
+            rows INTEGER NOT NULL, columns INTEGER NOT NULL, cells BLOB NOT NULL) STRICT""",
+    ),
 )
 
 

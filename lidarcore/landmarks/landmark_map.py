@@ -3,6 +3,7 @@
 import math
 import sqlite3
 from collections.abc import Iterable, Iterator
+from dataclasses import astuple, fields
 from typing import get_args
 
 from numpy.typing import ArrayLike
@@ -22,6 +23,7 @@ from lidarcore.landmarks.queries import (
     check_order,
     find,
 )
+from lidarcore.landmarks.stored_grid import StoredGrid
 from lidarcore.landmarks.wall import StoredWall
 from lidarcore.landmarks.wall_store import replace_walls, wall_history, walls_of
 
@@ -32,6 +34,7 @@ _INSERT = f"INSERT INTO landmarks ({_STATE}, id, session, sigma) VALUES ({_VALUE
 _UPDATE = (
     f"UPDATE landmarks SET ({_STATE}, sigma) = ({_VALUES}, :sigma) WHERE id = :id AND session = :session"
 )
+_GRID = ", ".join(one.name for one in fields(StoredGrid))
 _PLACE = "INSERT OR REPLACE INTO places VALUES (:id, :x, :x, :y, :y, 0, :sigma, :session, :session + 0.5)"
 _REMEMBER = (
     f"INSERT OR REPLACE INTO history ({_STATE}, landmark, second, session) "
@@ -113,6 +116,20 @@ class LandmarkMap:
         if found is None:
             raise UnknownWallError(f"Session {self.session} has no history of a wall {id}.")
         return found
+
+    def put_grid(self, grid: StoredGrid) -> None:
+        """Store an occupancy grid in place of that which the map has. Raises UnknownSessionError if it was deleted."""
+        with self._database.writing() as connection:
+            self._check(connection)
+            query = f"INSERT OR REPLACE INTO grids (session, {_GRID}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+            connection.execute(query, (self.session, *astuple(grid)))
+
+    def grid(self) -> StoredGrid | None:
+        """The occupancy grid, if there is one."""
+        query = f"SELECT {_GRID} FROM grids WHERE session = ?"
+        with self._database.reading() as connection:
+            row = connection.execute(query, (self.session,)).fetchone()
+        return None if row is None else StoredGrid(*row)
 
     def _check(self, connection: sqlite3.Connection) -> None:
         if not connection.execute("SELECT 1 FROM sessions WHERE id = ?", (self.session,)).fetchone():

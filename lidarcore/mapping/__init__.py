@@ -1,8 +1,8 @@
 """Maps from whole scans: a front end without odometry, a pose graph that closes loops, honest covariances."""
 
+from lidarcore.mapping.background import MapPicture
 from lidarcore.mapping.consistency import Loop
 from lidarcore.mapping.keyframes import Keyframes
-from lidarcore.mapping.map_worker import MapPicture
 from lidarcore.mapping.mapper import Mapper, Placement
 from lidarcore.mapping.pose_graph import PoseGraph
 from lidarcore.mapping.settings import FrontSettings, LoopSettings, MapperSettings, MatchSettings

@@ -3,16 +3,19 @@
 import logging
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
-from lidarcore.arrays import Array
-from lidarcore.errors import GridError
+from lidarcore.errors import GridError, LocalizationError
+from lidarcore.geometry import UncertainPose
+from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.back import BackEnd
+from lidarcore.mapping.background import END_WITHIN, Corrected, MapPicture
 from lidarcore.mapping.front import Tracked
 from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
-from lidarcore.mapping.settings import MapperSettings
+from lidarcore.mapping.settings import VAGUE, MapperSettings
 from lidarcore.mapping.walls import WallIds, Walls, find_walls
 from lidarcore.mapping.worker import Worker
 from lidarcore.settings import ExtractionSettings
@@ -22,36 +25,27 @@ _log = logging.getLogger(__name__)
 _EVERY = 1.0  # s between two pictures of the map, at least
 _REST = 10.0  # times as long as the walls took to find, they are not sought again
 _MOST_CELLS = 16_000_000  # of the grid; a larger building gets larger cells
-_END_WITHIN = 5.0  # s that the thread may take for what it is at
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Corrected:
-    """Poses (K, 3), T_map_keyframe, of the first K keyframes, and the covariance (3, 3) of the last of them."""
-
-    poses: Array
-    covariance: Array
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MapPicture:
-    """What is known of the building: which cells are occupied and free, and the walls, none before the first search."""
-
-    grid: OccupancyGrid
-    walls: Walls | None
+_NOT_CONNECTED = "The scan lies on nothing known: odometry or the last motion alone says where the sensor is."
+_ISLAND = (
+    "After a break without odometry the sensor may be in several places: what is mapped now is joined to what was "
+    "mapped before once it comes to a place that it has seen."
+)
+_NOT_PLACED = "A map of whole scans begins where its first scan was taken and cannot be moved."
 
 
 class MapWorker:
     """Takes keyframes; `corrected` and `picture` are replaced whole, and may be read from any thread.
 
-    keep  called with the walls, in the thread of the map, each time that they were found
+    keep  called with grid and walls, in the thread of the map, each time that walls were found
     """
+
+    mode: Literal["slam", "localize"] = "slam"
 
     def __init__(
         self,
         settings: MapperSettings,
         extraction: ExtractionSettings,
-        keep: Callable[[Walls], None] | None = None,
+        keep: Callable[[OccupancyGrid, Walls], None] | None = None,
     ) -> None:
         self._keep = keep
         self.corrected = Corrected(np.zeros((1, 3)), np.zeros((3, 3)))
@@ -73,13 +67,23 @@ class MapWorker:
         """Add a keyframe; returns at once."""
         self._worker.put(tracked)
 
+    def place(self, T_map_keyframe: UncertainPose) -> None:
+        """Raises LocalizationError: the map begins at its first scan, and cannot be moved."""
+        raise LocalizationError(_NOT_PLACED)
+
+    def judge(self, tracked: Tracked, here: UncertainPose) -> tuple[State, str | None]:
+        """Lost where the scan lies on nothing known, or the sensor may be in several places."""
+        if here.covariance[2, 2] > VAGUE**2:
+            return "lost", _ISLAND
+        return ("tracking", None) if tracked.on else ("lost", _NOT_CONNECTED)
+
     def end(self) -> None:
         """Take no more keyframes; returns at once."""
         self._worker.end()
 
     def close(self) -> None:
         """End, and wait for it."""
-        self._worker.close(_END_WITHIN)
+        self._worker.close(END_WITHIN)
 
     def _work(self, tracked: Tracked | None, _: int) -> None:
         try:
@@ -119,7 +123,7 @@ class MapWorker:
         if begin >= self._next_walls:
             self.picture = MapPicture(grid, walls := self._walls(grid))
             if self._keep:
-                self._keep(walls)
+                self._keep(grid, walls)
             end = time.monotonic()
             self._next_walls = end + _REST * (end - begin)
 

@@ -1,4 +1,4 @@
-"""SLAM from whole scans: each one is laid on the last keyframes at once, and the map behind is bent meanwhile."""
+"""The pose from whole scans: each one is laid on the last keyframes at once, and the map behind catches up."""
 
 from collections.abc import Callable
 
@@ -7,27 +7,24 @@ from numpy.typing import ArrayLike
 
 from lidarcore.arrays import Array
 from lidarcore.clusters import Clusters
-from lidarcore.errors import LocalizationError, MotionError
+from lidarcore.errors import MotionError
 from lidarcore.features import Features
-from lidarcore.geometry import UncertainPose, relative
-from lidarcore.localization import Estimate, Landmarks, Points, TrackingResult, Velocity
+from lidarcore.geometry import UncertainPose, check_covariance, inverse, relative
+from lidarcore.localization import Estimate, Landmarks, Points, TrackingResult, Velocity, as_pose
 from lidarcore.localization.dead_reckoning import DeadReckoning
 from lidarcore.localization.deskewing import Distortion
 from lidarcore.localization.ekf.estimate import Instant, no_innovation
 from lidarcore.localization.tracking_result import State, goes_on
+from lidarcore.mapping.background import Background, MapPicture
 from lidarcore.mapping.front import FrontEnd, Tracked
-from lidarcore.mapping.map_worker import MapPicture, MapWorker
-from lidarcore.mapping.settings import VAGUE, MapperSettings
+from lidarcore.mapping.grid import OccupancyGrid
+from lidarcore.mapping.locate_worker import LocateWorker
+from lidarcore.mapping.map_worker import MapWorker
+from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.walls import Walls
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
-_NOT_CONNECTED = "The scan lies on nothing known: odometry or the last motion alone says where the sensor is."
-_ISLAND = (
-    "After a break without odometry the sensor may be in several places: what is mapped now is joined to what was "
-    "mapped before once it comes to a place that it has seen."
-)
-_NOT_PLACED = "A map of whole scans begins where its first scan was taken and cannot be moved."
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 _NONE = Points(np.empty((0, 2)), np.eye(2))
 _NO_LANDMARKS = Landmarks.of(_NONE)
@@ -35,21 +32,29 @@ _PAUSE = 1.0  # s between scans, over which the motion between them does not tel
 
 
 class WholeScans:
-    """Says where each scan was taken, and builds the map of them in the background; used as a `Navigator` is.
+    """Says where each scan was taken, in a map that it builds of them or in a known one; used as a `Navigator` is.
+
+        with closing(WholeScans(known=MapPicture(read_ros_map("hall.yaml")), background=False)) as tracker:
+            for scan in open_recording(path):
+                found = tracker.step(tracker.deskewed(scan))
 
     extraction  noise of the sensor, and how walls are found
-    begin_map   called where a map begins; what it gives is called with the walls each time that they were found, in a
-                thread of its own
+    begin_map   called where a map begins; what it gives is called with grid and walls each time that these were found,
+                in a thread of its own
+    known       the map to localize in, from no guess of the pose or one that `place` tells; without, one is built
+    background  whether a known map is searched in a thread of its own: scans never wait, and the pose comes later
 
-    A thread runs until `close`.
+    Threads run until `close`.
     """
 
     def __init__(
         self,
         extraction: ExtractionSettings | None = None,
-        begin_map: Callable[[], Callable[[Walls], None]] | None = None,
+        begin_map: Callable[[], Callable[[OccupancyGrid, Walls], None]] | None = None,
+        known: MapPicture | None = None,
+        background: bool = True,
     ) -> None:
-        self._begin_map = begin_map
+        self._begin_map, self._known, self._in_background = begin_map, known, background
         self._extraction = extraction = extraction or ExtractionSettings()
         self._settings = MapperSettings().with_noise(extraction.noise)
         self._distortion, self._reckoning = Distortion(), DeadReckoning()
@@ -64,24 +69,30 @@ class WholeScans:
 
     @property
     def picture(self) -> MapPicture | None:
-        """Grid and walls as they are now; None until there are any."""
-        return self._worker.picture
+        """Grid and walls as they are known now; None until there are any."""
+        return self._background.picture
 
     @property
     def is_behind(self) -> bool:
         """Whether keyframes wait to be joined to the map."""
-        return self._worker.is_behind
+        return self._background.is_behind
 
     def path(self) -> Array:
         """(T, 2) m: where the keyframes were taken, as the map has them now, and the newest scan."""
-        known = self._worker.corrected.poses
+        known = self._background.corrected.poses
         newer = [pose.pose[:2] for pose in self._chain(len(known) - 1, len(self._ways))[1:]]
         here = [] if self._last is None else [self._last[1][:2]]
         return np.array([*known[:, :2], *newer, *here])
 
     def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
-        """Raises LocalizationError: the map begins at its first scan, and cannot be moved."""
-        raise LocalizationError(_NOT_PLACED)
+        """Say by hand where the sensor is in a known map: T_map_sensor (3,) m, m, rad and its covariance (3, 3).
+
+        Raises LocalizationError if the pose is not finite or the map is built, CovarianceError if the covariance is not
+        positive definite.
+        """
+        check_covariance(covariance, "The pose's covariance")
+        told = UncertainPose(as_pose(pose, "pose"), np.asarray(covariance, np.float64))
+        self._background.place(told.compose(UncertainPose(inverse(self._tie.pose), np.zeros((3, 3)))))
 
     def deskewed(self, scan: Scan) -> Scan:
         """The scan without the distortion by the sensor's motion, by odometry, else by the motion so far."""
@@ -99,10 +110,11 @@ class WholeScans:
             tracked, message = self._front.step(scan, self._removed(scan)), goes_on(error)
         here = self._located(tracked)
         self._reckon(scan, here.pose)
-        why = None if tracked.on else _NOT_CONNECTED
-        if here.covariance[2, 2] > VAGUE**2:
-            why = _ISLAND
-        state: State = "lost" if why else "tracking"
+        state, why = self._background.judge(tracked, here)
+        if self._is_nowhere and state != "starting":  # found: odometry is compared from here on
+            self._reckoning.interrupt()
+            self._reckoning.place(here.pose)
+        self._is_nowhere = state == "starting"
         return self._result(tracked.stamp, state, message or why, here)
 
     def _removed(self, scan: Scan) -> Array:
@@ -112,31 +124,39 @@ class WholeScans:
 
     def end(self) -> None:
         """Take no more scans; returns at once."""
-        self._worker.end()
+        self._background.end()
 
     def close(self) -> None:
         """End, and wait for what runs in the background."""
-        self._worker.close()
+        self._background.close()
 
     def _begin(self) -> None:
         self._front = FrontEnd(self._settings.front)
-        self._worker = MapWorker(self._settings, self._extraction, self._begin_map and self._begin_map())
+        self._background = self._begun()
         self._ways: list[UncertainPose] = []  # to each keyframe from the one before it
+        self._tie = _HERE  # T_keyframe_sensor
+        self._is_nowhere = False
         self._last = self._velocity = None
+
+    def _begun(self) -> Background:
+        if self._known is not None:
+            return LocateWorker(self._known, self._settings.drift_covariance, self._in_background)
+        return MapWorker(self._settings, self._extraction, self._begin_map and self._begin_map())
 
     def _located(self, tracked: Tracked) -> UncertainPose:
         """T_map_sensor: by the map as far as it has come, and from there from keyframe to keyframe."""
         tie = tracked.tie
         if tracked.keyframe:
             self._ways.append(UncertainPose(tie.pose, tie.covariance + self._settings.drift_covariance))
-            self._worker.put(tracked)
+            self._background.put(tracked)
             tie = _HERE
-        known = len(self._worker.corrected.poses)
+        self._tie = tie
+        known = len(self._background.corrected.poses)
         return self._chain(known - 1, len(self._ways))[-1].compose(tie)
 
     def _chain(self, first: int, end: int) -> list[UncertainPose]:
         """Poses of keyframes, of which the first is the last that the map has."""
-        known = self._worker.corrected
+        known = self._background.corrected
         poses = [UncertainPose(known.poses[first], known.covariance)]
         for way in self._ways[first + 1 : end]:
             poses.append(poses[-1].compose(way))
@@ -157,7 +177,7 @@ class WholeScans:
         estimate = Estimate(stamp, here.pose, here.covariance, velocity, no_innovation(0), u)
         return TrackingResult.of(
             stamp,
-            "slam",
+            self._background.mode,
             state,
             message,
             estimate,

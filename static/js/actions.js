@@ -84,7 +84,7 @@ let selecting = Promise.resolve(); // the request before: selections get to the 
  */
 export async function select(change) {
   const before = get("selection");
-  if ("corner" in change) set("wall", null);
+  if ("corner" in change) for (const wall of ["wall", "mappedWall"]) set(wall, null);
   set("selection", { ...before, ...change });
   try {
     selecting = selecting.catch(() => {}).then(() => request("PUT", "selection", change));

@@ -1,5 +1,6 @@
 // What the inspector says of the selected corner.
 
+import { placer } from "./overlay/world.js";
 import { sightedAt } from "./scatter.js";
 import { selectWall } from "./selected-wall.js";
 import { get } from "./store.js";
@@ -15,7 +16,7 @@ export function inspectedCorner(frame) {
   return {
     key: id,
     name: `Corner C${id}`,
-    at: [x, y],
+    at: placer(frame.localization?.pose)([x, y]),
     methods,
     facts: factsOf(measured[methods[0]]),
     rows: [],

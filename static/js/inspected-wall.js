@@ -2,6 +2,7 @@
 
 import { select } from "./actions.js";
 import { request } from "./api.js";
+import { mappedOf, selectMapped } from "./mapped.js";
 import { placer } from "./overlay/world.js";
 import { sightedWall } from "./scatter.js";
 import { mountSelectedWall, selectedWall } from "./selected-wall.js";
@@ -26,11 +27,11 @@ export function inspectedWall(frame) {
   return {
     key: get("wall"),
     name: "Wall",
-    at: [0, 1].map((axis) => (wall.start[axis] + wall.end[axis]) / 2),
+    at: placer(frame.localization?.pose)([0, 1].map((axis) => (wall.start[axis] + wall.end[axis]) / 2)),
     methods: seen.map(({ method }) => method),
     facts: factsOf(frame, wall),
     rows: seen.map(rowOf),
-    ways: cornersOf(frame, wall).map(({ id }) => [`Corner C${id}`, () => select({ corner: id })]),
+    ways: [...cornersOf(frame, wall).map(({ id }) => [`Corner C${id}`, () => select({ corner: id })]), ...wayToMap(frame, wall)],
     sighted: get("repeatability") && sightedWall(get("repeatability"), wall, frame),
     deviations: get("wallDeviations"),
     claims: seen.map(({ method, alpha, r, covariance }) => ({
@@ -66,6 +67,12 @@ const rowOf = ({ method, alpha, r, covariance: [[alphas], [, rs]] }) => [
 /** The corners at the ends of a wall of the main method. */
 const cornersOf = ({ corners, methods: [main] }, { id }) =>
   corners.filter(({ segments, by_method: measured }) => measured[main] && segments.includes(id));
+
+/** To the wall of the map that it is part of. */
+function wayToMap(frame, wall) {
+  const whole = mappedOf(frame, wall);
+  return whole ? [[`Wall W${whole.id} of the map`, () => selectMapped(whole.id)]] : [];
+}
 
 /** Asks how far the corners of the selected wall are from each other, and how sure. */
 async function measureLength() {

@@ -1,17 +1,19 @@
-// A card over the view: the selected corner or wall, what each method claims of it, and how often that was so.
+// A card over the view: the selected corner or wall, what each method claims of it, and how often that was so; of a wall
+// of the map, what it was before.
 
 import { changeSetting, select } from "./actions.js";
 import { KINDS } from "./boxes.js";
 import { $, el, iconButton, remake, setText, swatch } from "./dom.js";
+import { makeFigure } from "./figure.js";
 import { inspectedCorner } from "./inspected-corner.js";
+import { inspectedMapped, mountInspectedMapped } from "./inspected-mapped.js";
 import { inspectedWall, mountInspectedWall } from "./inspected-wall.js";
-import { placer } from "./overlay/world.js";
 import { lookNow } from "./scene.js";
 import { claimsOf, plotScatter, scatterDrawing } from "./scatter.js";
 import { get, on } from "./store.js";
 
 const EXPECTED = 0.95;
-const SHOWN = ["frame", "selection", "wall", "length", "repeatability", "deviations", "wallDeviations", "settings"];
+const SHOWN = ["frame", "selection", "wall", "mapped", "mappedWall", "wallHistory", "length", "repeatability", "deviations", "wallDeviations", "settings"];
 
 let shown; // what the card is about
 
@@ -22,7 +24,9 @@ const rows = el("table", { class: "listing" });
 const ways = el("p", { class: "ways" });
 const caption = el("p", { class: "muted" });
 const counts = el("ul", { class: "held" });
+const history = el("div");
 const start = el("button", { type: "button", title: "Keep the sensor still meanwhile" }, "Compare with the next scans");
+const sightings = el("div", {}, drawing, caption, counts, start);
 
 const fold = iconButton("fold", "Fold the inspector", () => {
   const isFolded = $("inspector").classList.toggle("folded");
@@ -34,15 +38,16 @@ fold.setAttribute("aria-expanded", "true");
 /** The card is made once: what a finger presses is still there when it is lifted. */
 export function mountInspector() {
   mountInspectedWall();
+  mountInspectedMapped();
   start.addEventListener("click", () => changeSetting("repeatability.running", true));
   const close = iconButton("close", "Close the inspector", () => select({ corner: null }));
-  $("inspector").append(el("h2", {}, title, fold, close), facts, rows, ways, drawing, caption, counts, start);
+  $("inspector").append(el("h2", {}, title, fold, close), facts, rows, ways, sightings, history);
   for (const key of SHOWN) on([key], refresh);
 }
 
 function refresh() {
   const frame = get("frame");
-  const thing = frame && (inspectedWall(frame) ?? inspectedCorner(frame));
+  const thing = frame && (inspectedMapped(frame) ?? inspectedWall(frame) ?? inspectedCorner(frame));
   $("inspector").hidden = !thing;
   if (thing?.key !== shown) standAside(thing);
   if (thing) draw(thing);
@@ -52,17 +57,24 @@ function refresh() {
 function standAside(thing) {
   shown = thing?.key;
   if (!thing) return;
-  const at = lookNow().toScreen(placer(get("frame").localization?.pose)(thing.at));
+  const at = lookNow().toScreen(thing.at);
   $("inspector").classList.toggle("left", Boolean(at) && at[0] > $("stage").clientWidth / 2);
 }
 
-/** `sighted` is what the last scans say of the thing, if they are compared; `claims` what this scan says. */
-function draw({ name, methods, sighted, deviations, claims, axes, ...thing }) {
-  const dots = (sighted && deviations?.id === sighted.id && deviations.deviations[methods[0]]) || [];
-  setText(title, name);
+function draw(thing) {
+  setText(title, thing.name);
+  facts.classList.toggle("long", Boolean(thing.history));
   showFacts(thing.facts);
   showRows(thing.rows);
   showWays(thing.ways);
+  sightings.hidden = Boolean(thing.history);
+  showHistory(thing);
+  if (!thing.history) drawSightings(thing);
+}
+
+/** `sighted` is what the last scans say of the thing, if they are compared; `claims` what this scan says. */
+function drawSightings({ name, methods, sighted, deviations, claims, axes }) {
+  const dots = (sighted && deviations?.id === sighted.id && deviations.deviations[methods[0]]) || [];
   showHeld(sighted ? heldBy(sighted, methods) : []);
   setText(caption, sighted ? `95\u2009% ellipses and ${dots.length} sightings by ${methods[0]} from their mean, ${axes}` : `95\u2009% ellipses of this scan, ${axes}`);
   start.hidden = get("settings").repeatability.running;
@@ -91,6 +103,17 @@ function showWays(wanted) {
     button.hidden = !run;
     button.onclick = run;
     setText(button, text);
+  });
+}
+
+let chart = null;
+
+/** What a thing of the map was, if it has a `history` that is not empty; `figure()` makes of it what is drawn. */
+function showHistory({ key, history: states, figure }) {
+  remake(history, [states?.length && key, states?.at(-1), document.documentElement.dataset.theme], () => {
+    chart?.remove();
+    chart = states?.length ? makeFigure(figure()) : null;
+    return chart ? [chart.node] : [];
   });
 }
 

@@ -1,13 +1,13 @@
 // The selected landmark: what is known of it, and how it became so.
 
 import { request } from "./api.js";
-import { token } from "./chart.js";
 import { $, el, iconButton, remake } from "./dom.js";
-import { line, makeFigure, stroke } from "./figure.js";
+import { earlierFigure } from "./earlier.js";
+import { makeFigure } from "./figure.js";
 import { longestSigma } from "./pose.js";
 import { select } from "./actions.js";
 import { get, on } from "./store.js";
-import { fixed, metres, millimetres, moment, squareMillimetres, wholeNumber } from "./units.js";
+import { metres, millimetres, moment, squareMillimetres, wholeNumber } from "./units.js";
 
 const REFRESH_MS = 2000;
 const MOST = 1000; // states of the history
@@ -71,31 +71,13 @@ function facts(landmark) {
 
 /** How far it was from where it is now, within the standard deviation it had. */
 function historyOf({ x, y, history }) {
-  const newest = history.at(-1)?.last_seen ?? 0;
-  const sigmas = history.map(longestSigma);
-  const data = [
-    history.map(({ last_seen }) => last_seen - newest),
-    history.map((then) => then.y - y),
-    history.map((then) => then.x - x),
-    sigmas.map((sigma) => -sigma),
-    sigmas,
-  ];
-  const dots = history.length < 3;
-  return {
+  return earlierFigure({
     title: "Earlier positions relative to the present one, mm",
-    series: [
-      line({ label: "y", key: "across", tone: "--across", dots }),
-      line({ label: "x", key: "along", tone: "--along", dots }),
+    states: history,
+    lines: [
+      { label: "y", key: "across", tone: "--across", of: (then) => then.y - y },
+      { label: "x", key: "along", tone: "--along", of: (then) => then.x - x },
     ],
-    band: { label: "±1σ", mark: stroke("band"), colour: token("--band") },
-    scale: "signed",
-    text: millimetres,
-    times: {
-      range: (_, low, high) => [Math.min(low ?? 0, high - 1), high],
-      values: (_, ticks) => ticks.map(before),
-    },
-    columns: () => data,
-  };
+    sigma: longestSigma,
+  });
 }
-
-const before = (tick) => (tick === 0 ? "last" : `${fixed(tick, 0)}\u2009s`);

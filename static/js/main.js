@@ -16,6 +16,8 @@ import { mountInspector } from "./inspector.js";
 import { mountLandmark } from "./landmark.js";
 import { mountLandmarks, receiveLandmarks } from "./landmarks.js";
 import { mountLink } from "./link.js";
+import { noneMapped, receiveMapped } from "./mapped.js";
+import { mountMappedTable } from "./mapped-table.js";
 import { mountMaps } from "./maps.js";
 import { mountMask } from "./mask.js";
 import { mountMethod } from "./method.js";
@@ -62,6 +64,7 @@ mountClusters();
 mountNavigation();
 mountLandmarks();
 mountLandmark();
+mountMappedTable();
 mountMaps();
 mountFilter();
 mountCorners();
@@ -81,12 +84,14 @@ mountWelcome();
 
 set("opening", null);
 set("wall", null);
-connect({ onOpen: join, onState: accept, onFrame: show, onLandmarks: receiveLandmarks });
+noneMapped();
+connect({ onOpen: join, onState: accept, onFrame: show, onLandmarks: receiveLandmarks, onWalls: receiveMapped });
 
 let joining; // no frame has come yet over this connection
 
 function join() {
   joining = true;
+  noneMapped();
   clearToasts("connection");
   keepTheme();
   learn();

@@ -6,11 +6,15 @@ import { reloadLandmarks } from "./landmarks.js";
 import { attempt, changeSetting } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { QUESTION_MS, toast } from "./toasts.js";
+import { isOfScans } from "./pose.js";
 import { moment, wholeNumber } from "./units.js";
+import { zipped } from "./zip.js";
 
 const BUILDING = { zip: "ROS map, walls and plan", png: "Picture" };
 const FORMATS = { json: "JSON", csv: "CSV", geojson: "GeoJSON", png: "Picture", zip: "ROS map" };
-const LOADED = ["json", "csv", "geojson"];
+const OF_GRID = { zip: "ROS map", png: "Picture" };
+const LOADED = ["json", "csv", "geojson", "zip"];
+const OF_ROS = ["yaml", "yml", "pgm", "png", "bmp"]; // which come together
 
 const clearButton = el(
   "button",
@@ -23,11 +27,12 @@ export function mountMaps() {
     type: "file",
     class: "visually-hidden",
     id: "map-file",
-    accept: LOADED.map((ending) => `.${ending}`).join(),
+    multiple: true,
+    accept: [...LOADED, ...OF_ROS].map((ending) => `.${ending}`).join(),
     "aria-label": "Map to load",
   });
   picker.addEventListener("change", () => {
-    load(picker.files[0]);
+    load([...picker.files]);
     picker.value = "";
   });
   $("maps").append(
@@ -65,32 +70,33 @@ function draw({ sessions, store }, { session }, landmarks) {
 }
 
 /** What is saved and cleared is the map that is built or localized in. */
-function offer({ session }, { navigation: { mode, method } }) {
-  const isOfScans = mode === "slam" && method === "scans";
-  const links = () => (session === null ? [nothingToSave()] : saveLinks(session));
-  remake($("map-save"), [session, isOfScans], () => (isOfScans ? buildingLinks() : links()));
+function offer(localization, { navigation }) {
+  const { session } = localization;
+  const ofGrid = isOfScans(navigation, localization);
+  const isBuilding = ofGrid && navigation.mode === "slam";
+  const links = () => (session === null ? [nothingToSave()] : saveLinks(session, ofGrid ? OF_GRID : FORMATS));
+  remake($("map-save"), [session, isBuilding, ofGrid], () => (isBuilding ? buildingLinks() : links()));
   clearButton.disabled = session === null;
 }
 
 function rows(sessions, { error }, live) {
   return [
     ...(error ? [el("p", { class: "fault", role: "alert" }, error)] : []),
-    ...(sessions.length ? [] : [el("p", { class: "muted" }, "None yet. SLAM builds one, or load a file.")]),
+    ...(sessions.length ? [] : [el("p", { class: "muted" }, "None yet. SLAM builds one, or load a file: landmarks, or a map of ROS.")]),
     el("ul", { class: "entries" }, ...[...sessions].reverse().map((session) => row(session, live))),
   ];
 }
 
-function row({ id, source, mode, started, landmarks, walls }, live) {
+function row({ id, source, mode, started, landmarks, walls, grid }, live) {
   const isUsed = id === live.session;
   const count = isUsed ? Math.max(landmarks, live.landmarks) : landmarks;
-  const holds = walls ? `${wholeNumber(walls)} walls` : `${wholeNumber(count)} landmarks`;
+  const holds = walls ? `${wholeNumber(walls)} walls` : grid ? "a grid" : `${wholeNumber(count)} landmarks`;
   const button = el(
     "button",
     {
       type: "button",
       class: "entry",
-      title: walls ? "Walls cannot be localized in yet" : `Localize in map ${id}`,
-      disabled: walls > 0,
+      title: `Localize in map ${id}`,
       "data-key": `map-${id}`,
       onclick: () => localizeIn(id),
     },
@@ -99,7 +105,7 @@ function row({ id, source, mode, started, landmarks, walls }, live) {
   );
   if (isUsed) button.setAttribute("aria-current", "true");
   const about = [source, mode === "import" ? "loaded" : null, moment(started)].filter(Boolean).join(", ");
-  const lost = walls ? holds : `${holds} and their history`;
+  const lost = grid && !walls ? holds : `${holds} and their history`;
   const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, lost));
   return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
 }
@@ -114,9 +120,9 @@ const buildingLinks = () => [
   ),
 ];
 
-const saveLinks = (session) => [
+const saveLinks = (session, formats) => [
   el("p", { class: "muted" }, `Save map ${session} as`),
-  ...Object.entries(FORMATS).map(([format, name]) =>
+  ...Object.entries(formats).map(([format, name]) =>
     saveLink(`map?format=${format}&session=${session}`, `map-${session}.${format}`, name, `map ${session}`),
   ),
 ];
@@ -162,18 +168,21 @@ function confirmClear(session) {
   });
 }
 
-async function load(file) {
-  if (!file) return;
-  const [, format] = /\.(\w+)$/.exec(file.name.toLowerCase()) ?? [];
-  const query = new URLSearchParams({
-    format: LOADED.includes(format) ? format : LOADED[0],
-    name: file.name,
-  });
-  const loaded = await attempt(() => send("POST", `map?${query}`, { body: file }), "The map could not be loaded");
+const ending = (name) => /\.(\w+)$/.exec(name.toLowerCase())?.[1];
+
+/** One file with a map, or a YAML and its image as ROS has them. */
+async function load(files) {
+  if (!files.length) return;
+  const [{ name }] = files;
+  const isOfRos = OF_ROS.includes(ending(name));
+  const format = isOfRos ? "zip" : LOADED.includes(ending(name)) ? ending(name) : LOADED[0];
+  const body = isOfRos ? await zipped(files) : files[0];
+  const query = new URLSearchParams({ format, name });
+  const loaded = await attempt(() => send("POST", `map?${query}`, { body }), "The map could not be loaded");
   if (!loaded) return;
   await list();
   const action = { label: "Localize in it", run: () => localizeIn(loaded.id) };
-  toast(`${file.name}: ${wholeNumber(loaded.landmarks)} landmarks`, {
+  toast(`${name}: ${loaded.grid ? "a grid" : `${wholeNumber(loaded.landmarks)} landmarks`}`, {
     title: `Map ${loaded.id} is loaded`,
     action,
   });

@@ -7,6 +7,7 @@ import { forget } from "./history.js";
 import { placingControls } from "./placing.js";
 import { attempt, changeSetting, setting, settings } from "./actions.js";
 import { on } from "./store.js";
+import { isOfScans } from "./pose.js";
 import { showPanel } from "./tabs.js";
 import { layerChips } from "./view.js";
 import { posePanel } from "./pose-panel.js";
@@ -88,11 +89,12 @@ export function mountNavigation() {
     el("div", { class: "buttons" }, ...placingControls(), reset),
   );
   on(["fields"], (fields) => $("navigation").append(layerChips(fields, { ofMap: true })));
-  on(["settings"], ({ navigation: { mode, landmarks } }) => {
-    const wholeScans = mode === "slam" && method.value() === "scans";
+  on(["settings", "localization"], ({ navigation }, localization) => {
+    const { mode, landmarks } = navigation;
+    const wholeScans = isOfScans(navigation, localization);
     $("map").dataset.of = wholeScans ? "scans" : "landmarks";
     methodRow.hidden = mode === "localize";
-    landmarksRow.hidden = mode !== "localize";
+    landmarksRow.hidden = mode !== "localize" || wholeScans;
     motionRow.hidden = wholeScans;
     $("cluster-hint").hidden = wholeScans || landmarks !== "clusters";
     setText($("mode-about"), ABOUT[mode]);

@@ -11,7 +11,7 @@ import { degrees, fixed, metres, microseconds, millimetres, UNKNOWN, wholeNumber
 const STATES = {
   starting: "Starting, too little seen so far",
   tracking: "Tracking",
-  coasting: "Coasting, no known landmark in view",
+  coasting: "Coasting, not confirmed by what is in view",
   lost: "Lost, looking for a known place",
 };
 

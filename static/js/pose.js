@@ -16,5 +16,9 @@ export function errorOf({ pose, truth }) {
   return { distance: Math.hypot(pose.x - x, pose.y - y), heading: turn };
 }
 
+/** Whether whole scans tell the pose: they make a map, or are laid on the grid of one. */
+export const isOfScans = ({ mode, method }, localization) =>
+  mode === "slam" ? method === "scans" : mode === "localize" && localization.method === "scans";
+
 /** An angle in -π to π. */
 export const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));

@@ -3,6 +3,7 @@
 import { nextCorner } from "./corners.js";
 import { $, el } from "./dom.js";
 import { nextLandmark } from "./landmarks.js";
+import { nextMapped } from "./mapped-table.js";
 import { toggleMethod } from "./method.js";
 import { nextMode } from "./navigation.js";
 import { cancelMeasure, toggleMeasure } from "./overlay/measure.js";
@@ -62,8 +63,8 @@ const SHORTCUTS = [
   { keys: ["-", "+"], about: "Smaller, larger ellipses", run: scaleEllipses },
   {
     keys: ["ArrowUp", "ArrowDown"],
-    about: "Previous, next corner; landmark while the map is open",
-    run: (key) => (get("panel") === "map" ? nextLandmark : nextCorner)(key === "ArrowUp" ? -1 : 1),
+    about: "Previous, next corner; landmark or wall of the map while that is open",
+    run: (key) => nextThing()(key === "ArrowUp" ? -1 : 1),
   },
   { keys: ["Escape"], about: "Clear the selection, or stop measuring or setting the pose", run: () => cancelPlacing() || cancelMeasure() || selectNothing() },
   { keys: ["m"], about: "Off, SLAM, localize", run: nextMode },
@@ -127,6 +128,11 @@ function compareWith(digit) {
   const name = fitterOf(digit);
   if (name) toggleMethod(name);
   return Boolean(name);
+}
+
+function nextThing() {
+  if (get("panel") !== "map") return nextCorner;
+  return get("mapped").walls.length ? nextMapped : nextLandmark;
 }
 
 /** The first scan there is; of a live source that is the oldest one kept. */

@@ -6,7 +6,7 @@ import { set } from "./store.js";
 const FIRST_WAIT_MS = 400;
 const LONGEST_WAIT_MS = 5000;
 
-/** Keeps a connection for the life of the page; handlers are onState, onFrame, onLandmarks and onOpen(). */
+/** Keeps a connection for the life of the page; handlers are onState, onFrame, onLandmarks, onWalls and onOpen(). */
 export function connect(handlers) {
   let socket;
   let wait = FIRST_WAIT_MS;
@@ -33,6 +33,7 @@ export function connect(handlers) {
     if (message.type === "frame") handlers.onFrame(message);
     else if (message.type === "state") handlers.onState(message);
     else if (message.type === "landmarks") handlers.onLandmarks(message);
+    else if (message.type === "walls") handlers.onWalls(message);
   }
 
   set("connection", "connecting");

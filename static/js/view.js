@@ -7,6 +7,7 @@ import { stroke } from "./figure.js";
 import { parameterRow } from "./parameters.js";
 import { TOOLS } from "./overlay/tools.js";
 import { ownChoices } from "./own.js";
+import { isOfScans } from "./pose.js";
 import { get, on } from "./store.js";
 import { shape } from "./svg.js";
 import { fixed } from "./units.js";
@@ -34,12 +35,12 @@ export function mountView() {
     $("rejection-toggle").replaceChildren(switchRow("Show them in the scene", "view.layers.rejected"));
   });
   $("legend").open = !narrow.matches;
-  for (const key of ["frame", "settings", "methods", "sizes"]) on([key], refreshLegend);
+  for (const key of ["frame", "settings", "methods", "sizes", "localization"]) on([key], refreshLegend);
 }
 
 function refreshLegend() {
   const [frame, settings, methods] = ["frame", "settings", "methods"].map(get);
-  if (frame && settings && methods) drawLegend(frame, settings, methods, get("sizes"));
+  if (frame && settings && methods) drawLegend(frame, settings, methods, get("sizes"), get("localization"));
 }
 
 /** Layers, theme, rotation and the size of ellipses are this browser's own. */
@@ -94,12 +95,11 @@ const MAPPED = [
 const SIZES = { grown: "too small to see: drawn larger", shrunk: "larger than the view: drawn smaller" };
 
 /** The legend names what is drawn, and says by how much the ellipses are enlarged and what the colours of points mean. */
-function drawLegend(frame, settings, methods, sizes) {
+function drawLegend(frame, settings, methods, sizes, localization) {
   const { ellipse_scale: scale, layers } = settings.view;
   const { localization: now, colour_scale: colours } = frame;
   const paths = PATHS.filter(({ layer, isKnown }) => now && layers[layer] && isKnown(now));
-  const { mode, method } = settings.navigation;
-  const ofScans = mode === "slam" && method === "scans";
+  const ofScans = isOfScans(settings.navigation, localization);
   const mapped = MAPPED.filter(({ layer }) => now && layers[layer] && (layer === "walls") === ofScans);
   const ofScan = OF_SCAN.filter(({ layer, isKnown }) => layers[layer] && (isKnown?.(frame, settings) ?? true));
   const signs = [...ofScan, ...paths, ...mapped];

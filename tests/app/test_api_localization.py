@@ -233,6 +233,7 @@ def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(drivi
     located(driving, lambda where: where["mode"] == "slam")
 
 
+@pytest.mark.long
 def test_a_recording_that_is_opened_again_leaves_one_map_beside_the_one_that_is_built(
     server: Server, room: Path
 ) -> None:

@@ -1,8 +1,11 @@
-"""Measuring in the current frame: the room's own measures, with sigmas, and what cannot be measured."""
+"""Measuring in the current frame and in its map: the room's own measures, with sigmas, and what cannot be measured."""
 
 import numpy as np
 import pytest
-from serving import CORNERS, Server, assert_problem
+from serving import CORNERS, Server, assert_problem, write_room
+
+WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
+MIDDLES = (CORNERS + np.roll(CORNERS, -1, axis=0)) / 2
 
 
 def at(kind: str, xy: np.ndarray) -> str:
@@ -12,11 +15,10 @@ def at(kind: str, xy: np.ndarray) -> str:
 def test_corners_and_walls_are_as_far_from_each_other_as_in_the_room(server: Server, room) -> None:
     frame = server.play(room, paused=True)
     ids = {corner["id"] for corner in frame["corners"]}
-    middles = (CORNERS + np.roll(CORNERS, -1, axis=0)) / 2
     for first, second, distance in (
         (at("corner", CORNERS[0]), at("corner", CORNERS[2]), np.hypot(6, 4)),
-        (at("corner", CORNERS[0]), at("wall", middles[2]), 4.0),
-        (at("wall", middles[0]), at("wall", middles[2]), 4.0),
+        (at("corner", CORNERS[0]), at("wall", MIDDLES[2]), 4.0),
+        (at("wall", MIDDLES[0]), at("wall", MIDDLES[2]), 4.0),
     ):
         found = server.get("/measure", first=first, second=second)
         assert 0 < found["sigma"] < 0.01
@@ -30,3 +32,47 @@ def test_what_is_not_there_is_not_measured(server: Server, room) -> None:
     corner, nowhere = at("corner", CORNERS[0]), "corner@0.5,0.2"
     for first, second, status in ((corner, nowhere, 404), (corner, corner, 404), (corner, "post@1,2", 422)):
         assert_problem(server.http.get("/measure", params={"first": first, "second": second}), status)
+
+
+@pytest.fixture
+def mapped(server: Server) -> Server:
+    """The sensor stands still, so the frame of the map is that of the room."""
+    server.change("PATCH", "/settings", WHOLE_SCANS)
+    server.play(write_room(server.folder / "long.npz", scans=600))
+    with server.stream() as stream:
+        stream.until("walls", lambda message: len(message["corners"]) == 4)
+    server.change("PATCH", "/source", {"state": "paused"})
+    return server
+
+
+def test_corners_and_walls_of_the_map_are_as_far_from_each_other_as_in_the_room(mapped: Server) -> None:
+    ids = {wall["id"] for wall in mapped.get("/walls")["walls"]}
+    for first, second, distance in (
+        (at("map-corner", CORNERS[0]), at("map-corner", CORNERS[2]), np.hypot(6, 4)),
+        (at("map-corner", CORNERS[0]), at("map-wall", MIDDLES[2]), 4.0),
+        (at("map-wall", MIDDLES[0]), at("map-wall", MIDDLES[2]), 4.0),
+    ):
+        found = mapped.get("/measure", first=first, second=second)
+        assert 0 < found["sigma"] < 0.02
+        assert found["distance"] == pytest.approx(distance, abs=6 * found["sigma"])
+        assert [found["first"]["kind"], found["second"]["kind"]] == [
+            first.split("@")[0],
+            second.split("@")[0],
+        ]
+    assert {found["first"]["id"], found["second"]["id"]} < ids
+    assert found["angle"] == pytest.approx(0, abs=6 * found["angle_sigma"])
+
+
+def test_scan_and_map_are_not_mixed_and_without_a_map_nothing_of_it_is_measured(mapped: Server, room) -> None:
+    corner, other = CORNERS[0], CORNERS[2]
+    for first, second, status in (
+        (at("map-corner", corner), at("corner", other), 422),
+        (at("wall", MIDDLES[0]), at("map-wall", MIDDLES[2]), 422),
+        (at("map-corner", corner), at("map-corner", corner), 404),
+        (at("map-corner", corner), "map-wall@0.5,0.2", 404),
+    ):
+        assert_problem(mapped.http.get("/measure", params={"first": first, "second": second}), status)
+    mapped.change("PATCH", "/settings", {"navigation": {"mode": "off"}})
+    mapped.play(room, paused=True)
+    params = {"first": at("map-corner", corner), "second": at("map-corner", other)}
+    assert "slam" in assert_problem(mapped.http.get("/measure", params=params), 404)["detail"]

@@ -10,12 +10,13 @@ from pathlib import Path
 
 import httpx
 import lidarcore_app.web.stream
+import numpy as np
 import pytest
 import websockets
 from lidarcore_app.pipeline.newest import NewestScan
 from lidarcore_app.web.stream import Mailbox
 from lidarcore_app.web.transport import SEND_BUFFER
-from serving import ROOT, Json, Server, strict_json, write_room
+from serving import CORNERS, ROOT, Json, Server, strict_json, write_room
 from waiting import PATIENCE
 
 RECEIVE_BUFFER = 8192
@@ -32,6 +33,26 @@ def test_first_comes_the_state_then_the_newest_frame(server: Server) -> None:
     assert state["recorder"] == server.get("/recorder")
     assert frame["type"] == "frame"
     assert frame.keys() - {"type", "points"} == server.get("/frame").keys()
+
+
+def test_walls_of_the_map_are_told_of_when_they_change_and_to_who_comes_later(server: Server) -> None:
+    """The sensor stands still: there is one keyframe, and so one map of walls, for all the frames."""
+    server.change("PATCH", "/settings", {"navigation": {"mode": "slam", "method": "scans"}})
+    server.play(write_room(server.folder / "long.npz", scans=600))
+    with server.stream() as stream:
+        told = stream.until("walls", lambda message: len(message["walls"]) == 4)
+        for _ in range(10):
+            assert stream.message()["type"] != "walls"
+        assert told["walls"] == server.get("/walls")["walls"]
+        ids = {wall["id"] for wall in told["walls"]}
+        for corner in told["corners"]:
+            assert set(corner["walls"]) < ids
+            assert np.abs(CORNERS - corner["at"]).max(axis=1).min() < 0.02
+        assert len(told["corners"]) == 4
+        with server.stream() as later:
+            assert later.until("walls", bool) == told
+        server.change("PATCH", "/settings", {"navigation": {"mode": "off"}})
+        assert stream.until("walls", bool) == {"type": "walls", "walls": [], "corners": []}
 
 
 def test_every_change_is_told_to_every_client(server: Server, room: Path) -> None:

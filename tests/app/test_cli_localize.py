@@ -59,6 +59,7 @@ def test_a_map_that_slam_saved_is_one_to_localize_in(
     assert np.median(errors[1]) < 0.25
 
 
+@pytest.mark.long
 def test_a_map_of_whole_scans_has_the_poses_of_all_scans(
     scans: list[Scan], recording: Path, tmp_path: Path
 ) -> None:

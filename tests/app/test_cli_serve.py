@@ -132,6 +132,7 @@ def test_a_signal_stops_the_motor_and_closes_the_recording(
     assert recording.notes == ()
 
 
+@pytest.mark.long
 def test_killed_at_once_it_loses_a_second_at_most_and_the_next_one_takes_the_sensor_over(
     serving: Serve, sensor: EmulatorProcess, tmp_path: Path
 ) -> None:

@@ -79,6 +79,7 @@ def test_a_source_that_is_closed_ends_its_process(tmp_path: Path) -> None:
     assert source.error is None
 
 
+@pytest.mark.long
 def test_an_upload_too_large_to_be_read_is_refused_while_frames_go_on(server: Server) -> None:
     """100 MB of points in one scan: more than 1 GB as Python objects, were they read."""
     body = b'{"dev1": [' + b"[1.0, 2.0]," * 9_000_000 + b"[1.0, 2.0]]}"

@@ -50,6 +50,7 @@ def test_no_such_port(live: Server) -> None:
     assert "There is no port /dev/ttyUSB98" in refused(live, 404, {"kind": "device", "port": "/dev/ttyUSB98"})
 
 
+@pytest.mark.long
 def test_no_serial_port(live: Server) -> None:
     assert "cannot be used as a serial port" in refused(live, 404, {"kind": "device", "port": "/dev/null"})
 

@@ -110,6 +110,7 @@ def test_the_emulator_plays_obeys_and_ends_with_its_source(server: Server, room:
     assert not os.path.lexists(answer["device"]["port"])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "command",
     ["quit", "unplug 5", "lose", "lose 0.1\nquit", "lose 1.2.3", "lose 7", "stall 1 2", "explode", ""],

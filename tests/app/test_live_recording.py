@@ -47,6 +47,7 @@ def assert_every_revolution(scans: list[Scan]) -> None:
         assert after.stamp - before.stamp == pytest.approx(0.1, abs=0.02)
 
 
+@pytest.mark.long
 def test_what_is_recorded_is_what_was_shown(watching: Server, sensor: EmulatorProcess) -> None:
     sensor.command("lose 0.05")  # all of 13 revolutions come whole once in 10^6 times
     with watching.stream() as stream:

@@ -61,6 +61,7 @@ def test_a_sensor_plays_and_says_what_it_is(server: Server, sensor: EmulatorProc
     assert server.get("/source")["state"] == "playing"
 
 
+@pytest.mark.long
 def test_frames_come_at_the_sensors_rate_numbered_and_stamped(watching: Server) -> None:
     with watching.stream() as stream:
         settled(stream)
@@ -129,6 +130,7 @@ def test_a_recording_has_no_motor(server: Server) -> None:
     assert server.get("/source")["loop"] == before["loop"]
 
 
+@pytest.mark.long
 def test_while_paused_kept_revolutions_are_stepped_through_and_playing_shows_the_newest(
     watching: Server,
 ) -> None:

@@ -4,6 +4,7 @@ import os
 import time
 from pathlib import Path
 
+import pytest
 from lidarcore_app.sources.library import ABANDONED, Library
 from serving import Server, assert_problem, wait_until, write_room
 
@@ -51,6 +52,7 @@ def test_a_recording_that_vanishes_while_it_is_listed_is_left_out(tmp_path: Path
     assert [entry.name for entry in library.list()] == [room.name]
 
 
+@pytest.mark.long
 def test_what_is_being_recorded_is_neither_deleted_nor_replaced(watching: Server, tmp_path: Path) -> None:
     watching.change("POST", "/recorder/start", {"name": "hall.mcap", "raw": True})
     room = write_room(tmp_path / "room.npz").read_bytes()

@@ -17,8 +17,15 @@ from processes import Serving
 from serving import Server, assert_problem, write_room
 from waiting import wait_until
 
-from lidarcore.errors import LandmarkError, LandmarkMapError, UnknownSessionError, UnknownWallError
+from lidarcore.errors import (
+    LandmarkError,
+    LandmarkMapError,
+    MapFileError,
+    UnknownSessionError,
+    UnknownWallError,
+)
 from lidarcore.landmarks import Atlas, StoredWall
+from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
 ROBOT = {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}}
@@ -29,6 +36,9 @@ def stored(id: int, x: float = 0.0, count: int = 5) -> StoredWall:
     return StoredWall(
         id, 0.0, x, 1e-6, 1e-7, 1e-5, x, -1.0, x, 1.0, 2.0, 1e-4, 1, 0, 0, 1, 10.0 + id, 20.5, count
     )
+
+
+GRID = OccupancyGrid(np.array([[0, 100, -1], [37, 0, 0]]), 0.05, np.array([-1.0, 2.0, 0.3]))
 
 
 def walls(*rows: StoredWall) -> WallTable:
@@ -123,7 +133,7 @@ def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
     run = store.begin_walls("room.mcap")
     states = [replace(stored(4), length=1.0 + i, last_seen=100.0 + i) for i in range(5)]
     for state in states:
-        run.put(walls(state))
+        run.put(GRID, walls(state))
         wait_until(lambda: run.session is not None and store.status.behind_s == 0)
     told = server.get("/walls/4/history", limit=3)
     assert told["session"] == run.session
@@ -133,7 +143,7 @@ def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
     rest = server.get("/walls/4/history", limit=3, after=told["next"], session=run.session)
     assert [wall["last_seen"] for wall in rest["history"]] == [103.0, 104.0]
     assert rest["next"] is None
-    run.put(walls(stored(7)))
+    run.put(GRID, walls(stored(7)))
     wait_until(lambda: store.status.behind_s == 0)
     gone = server.get("/walls/4/history")
     assert gone["wall"] is None
@@ -146,29 +156,57 @@ def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
 def test_a_run_keeps_its_confirmed_walls_and_says_when_it_has_ended(tmp_path: Path) -> None:
     with closing(LandmarkStore(tmp_path / "maps.db")) as store:
         run = store.begin_walls("room.mcap")
-        run.put(walls(stored(0, count=CONFIRMED - 1)))
+        run.put(GRID, walls(stored(0, count=CONFIRMED - 1)))
         wait_until(lambda: store.status.behind_s == 0)
         assert store.atlas.sessions() == []
-        run.put(walls(stored(0), stored(1, count=CONFIRMED - 1), stored(2, count=CONFIRMED)))
+        run.put(GRID, walls(stored(0), stored(1, count=CONFIRMED - 1), stored(2, count=CONFIRMED)))
         wait_until(lambda: run.session is not None and store.status.behind_s == 0)
         assert [wall.id for wall in store.atlas[run.session].walls()] == [0, 2]
         assert store.writes(run.session)
-        assert store.newest() is None  # of landmarks
+        assert store.newest() == run.session  # its grid can be localized in
         store.use(None)
-        run.put(walls(stored(0), stored(2), stored(3)))  # found while the run ended
+        run.put(GRID, walls(stored(0), stored(2), stored(3)))  # found while the run ended
         wait_until(lambda: len(store.walls(run.session)) == 3 and store.status.behind_s == 0)
         (session,) = store.atlas.sessions()
         assert (session.source, session.mode, session.walls) == ("room.mcap", "slam", 3)
         assert session.ended is not None
 
 
+def test_the_grid_of_a_run_is_kept_with_its_walls(tmp_path: Path) -> None:
+    newer = replace(GRID, cells=GRID.cells.T)
+    with closing(LandmarkStore(tmp_path / "maps.db")) as store:
+        run = store.begin_walls("room.mcap")
+        run.put(GRID, walls(stored(0)))
+        wait_until(lambda: run.session == 1 and store.status.behind_s == 0)
+        run.put(newer, walls(stored(0)))
+        wait_until(lambda: store.status.behind_s == 0)
+    with closing(LandmarkStore(tmp_path / "maps.db")) as store:
+        assert [session.grid for session in store.atlas.sessions()] == [True]
+        kept = store.grid(1)
+        assert kept is not None
+        np.testing.assert_array_equal(kept.cells, newer.cells)
+        np.testing.assert_array_equal(kept.origin, GRID.origin)
+        assert kept.resolution == GRID.resolution
+        other = store.atlas.begin("corners", 2.0)
+        assert store.grid(other.session) is None
+        with closing(sqlite3.connect(tmp_path / "maps.db")) as file, file:
+            file.execute("UPDATE grids SET columns = 4")
+        with pytest.raises(MapFileError, match="damaged"):
+            store.grid(1)
+        store.atlas.delete(1)
+        with pytest.raises(UnknownSessionError):
+            store.grid(1)
+    with closing(sqlite3.connect(tmp_path / "maps.db")) as file:
+        assert file.execute("SELECT count(*) FROM grids").fetchone() == (0,)
+
+
 def test_a_map_that_is_deleted_while_it_grows_begins_again(tmp_path: Path) -> None:
     with closing(LandmarkStore(tmp_path / "maps.db")) as store:
         run = store.begin_walls("room.mcap")
-        run.put(walls(stored(0)))
+        run.put(GRID, walls(stored(0)))
         wait_until(lambda: run.session == 1 and store.status.behind_s == 0)
         store.atlas.delete(1)
-        run.put(walls(stored(0), stored(1)))
+        run.put(GRID, walls(stored(0), stored(1)))
         wait_until(lambda: run.session == 2 and store.status.behind_s == 0)
         assert [astuple(wall)[0] for wall in store.atlas[2].walls()] == [0, 1]
 

@@ -21,6 +21,7 @@ def open_guide(visitor: Visitor) -> Visitor:
     return visitor
 
 
+@pytest.mark.long
 def test_the_server_hands_out_the_guide_under_its_rules(server: Server) -> None:
     answer = httpx.get(f"{server.url}/guide")
     assert answer.status_code == 200

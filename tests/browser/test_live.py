@@ -265,6 +265,7 @@ def test_link_to_a_live_view_shows_what_is_live_now(live: Watched, visit: Callab
     assert live.server.get("source")["kind"] == "emulator"
 
 
+@pytest.mark.long
 def test_what_is_recorded_is_what_the_page_showed(live: Watched) -> None:
     page, server = live.page, live.server
     page.get_by_text("Raw", exact=True).click()

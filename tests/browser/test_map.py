@@ -3,7 +3,9 @@
 import json
 import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -11,6 +13,8 @@ from browsing import HOKUYO, Server, Visitor
 from numpy.typing import NDArray
 from playwright.sync_api import Browser, Page, expect
 from waiting import wait_until
+
+from lidarcore.mapping.grid import OccupancyGrid, read_ros_map, write_ros_map
 
 FEW = 8  # landmarks that a furnished room has soon; with fewer than half of what is in view it is not recognized
 MAPPED = range(60, 75)  # scans of the real recording that are mapped, one after the other
@@ -294,6 +298,26 @@ def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
     page.get_by_role("button", name="Delete", exact=True).click()
     expect(page.get_by_role("button", name=f"Delete map {session}")).to_have_count(0)
     assert session not in [entry["id"] for entry in server.get("sessions")["sessions"]]
+
+
+def test_a_map_of_ros_is_loaded_as_two_files_and_localized_in(mapped: Visitor, tmp_path: Path) -> None:
+    page, server = mapped.page, mapped.server
+    cells = np.full((80, 120), -1)
+    cells[10:70, 10:110] = 0
+    cells[10, 10:110] = cells[69, 10:110] = cells[10:70, 10] = cells[10:70, 109] = 100
+    write_ros_map(OccupancyGrid(cells, 0.05, np.zeros(3)), tmp_path / "hall.yaml")
+    page.locator("#map-file").set_input_files([tmp_path / "hall.yaml", tmp_path / "hall.pgm"])
+    expect(page.locator(".toast")).to_contain_text("hall.yaml: a grid")
+    page.get_by_role("button", name="Localize in it").click()
+    wait_until(lambda: server.get("localization")["method"] == "scans", "whole scans look for the pose")
+    session = server.get("localization")["session"]
+    expect(page.locator("#map-list [aria-current]")).to_contain_text("a grid")
+    expect(page.locator("#pose-panel-state")).to_have_text(re.compile("Starting|Coasting|Tracking"))
+    with page.expect_download() as saved:
+        page.get_by_role("link", name=f"Save map {session} as ROS map").click()
+    with ZipFile(saved.value.path()) as archive:
+        archive.extractall(tmp_path / "back")
+    np.testing.assert_array_equal(read_ros_map(tmp_path / "back" / "map.yaml").cells, cells)
 
 
 @pytest.mark.long

@@ -26,6 +26,7 @@ def test_fitter_chosen_in_the_page_makes_the_frames(visitor: Visitor) -> None:
         expect(page.locator("#corner-table thead")).to_contain_text(name)
 
 
+@pytest.mark.long
 def test_covariance_kind_changes_the_ellipses(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     server.show(HOKUYO, 120)

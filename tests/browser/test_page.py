@@ -17,6 +17,7 @@ def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
     visitor.check()
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_scene_shows_the_room(visitor: Visitor) -> None:
     def fills_the_scene() -> bool:
@@ -35,6 +36,7 @@ def test_frames_advance_in_figures_and_picture(visitor: Visitor) -> None:
     wait_until(lambda: (visitor.picture() != picture).any(), "the picture changes")
 
 
+@pytest.mark.long
 @pytest.mark.scene
 def test_the_stream_alone_brings_the_frames(visitor: Visitor) -> None:
     first = int(visitor.readout("frame"))
@@ -43,6 +45,7 @@ def test_the_stream_alone_brings_the_frames(visitor: Visitor) -> None:
     assert not [url for url in visitor.asked[asked:] if "/frame" in url or "/health" in url]
 
 
+@pytest.mark.long
 def test_figures_are_those_of_the_frame(visitor: Visitor) -> None:
     page, frame = visitor.page, visitor.await_frame(visitor.server.pause())
     assert visitor.readout("corners") == str(len(frame["corners"]))

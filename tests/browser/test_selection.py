@@ -104,6 +104,7 @@ def test_row_selected_in_the_table_is_ringed(still: Visitor) -> None:
         wait_until(lambda c=column, r=row: inked(still)[r, c + 12, 3] < 127, "the ring is gone")
 
 
+@pytest.mark.long
 def test_corner_clicked_over_the_scene_is_selected_in_the_table(still: Visitor) -> None:
     id_ = ids_by_x(still)[1]
     x, y = still.pixel_of("corner", id_)

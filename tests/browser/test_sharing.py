@@ -18,6 +18,7 @@ SHOWN = {"view": {"compare": True, "methods": ["cwlf", "ml"], "colour": "range",
                         "noise": {"sigma_range": 0.03}}}  # fmt: skip
 
 
+@pytest.mark.long
 def test_link_restores_the_view_in_a_fresh_browser(server: Server, visit: Callable[..., Visitor]) -> None:
     first = visit().open()
     server.show(GOLF, 123)

@@ -90,6 +90,7 @@ def test_a_study_is_run_and_its_report_read_in_the_page(studies: Callable[..., V
     expect(page.locator("#readout-frame")).to_have_text(re.compile(r"^\d+$"), timeout=30_000)
 
 
+@pytest.mark.long
 def test_a_study_is_cancelled(studies: Callable[..., Visitor]) -> None:
     visitor = studies()
     form = study(visitor.page, "Conditional weighted linear fitting")

@@ -18,6 +18,7 @@ def page(visit: Callable[..., Visitor]) -> Page:
     return visit(1400, 900, first_visit=True).open().page
 
 
+@pytest.mark.long
 def test_why_a_wall_is_missing(page: Page) -> None:
     page.keyboard.press("Space")
     page.get_by_role("tab", name="Rejected").click()
@@ -26,6 +27,7 @@ def test_why_a_wall_is_missing(page: Page) -> None:
     expect(panel).to_contain_text(re.compile(r"(min_points|min_length|corner_gap|corner_angle) (is|allows)"))
 
 
+@pytest.mark.long
 def test_which_methods_ellipse_is_true_here(server: Server, visit: Callable[..., Visitor]) -> None:
     server.patch("settings", {"extraction": {"noise": asdict(EmulatorOptions().noise)}})  # as after a start
     visitor = visit(1400, 900, first_visit=True).open()
@@ -77,6 +79,7 @@ def time_that_stays(page: Page) -> float:
     return 60 * int(minutes) + float(seconds)
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_a_recording_is_played_and_a_link_to_second_12_sent(
     page: Page, server: Server, visit: Callable[..., Visitor]
@@ -105,6 +108,7 @@ def test_a_recording_is_played_and_a_link_to_second_12_sent(
     expect(other.page.locator("#time")).to_have_text(shown)
 
 
+@pytest.mark.long
 def test_a_map_is_built_and_saved_for_ros(page: Page) -> None:
     page.get_by_role("button", name="Build a map").click()
     page.get_by_role("tab", name="Map").click()

@@ -66,6 +66,7 @@ def test_posts_a_metre_apart_are_found_without_being_told_their_number(method, n
         assert same_partition(cluster(scan, settings(method)).labels, post)
 
 
+@pytest.mark.long
 @every_method
 def test_the_start_of_the_ring_does_not_matter(method):
     for scan in room_scans(2):
@@ -92,6 +93,7 @@ def test_an_object_behind_the_sensor_is_not_cut_by_the_seam(method):
     assert same_partition(cluster(scan, settings(method)).labels, post)
 
 
+@pytest.mark.long
 @every_method
 def test_the_same_scan_gives_the_same_clusters_in_any_thread(method):
     scans = room_scans(2) * 3

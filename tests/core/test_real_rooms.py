@@ -116,6 +116,7 @@ def stations(data):
 WITH_CORNERS = [0, 1, 2, 3, 12]  # further on only the parallel walls of the corridor are in view
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("station", WITH_CORNERS)
 def test_a_sensor_that_stands_still_finds_its_corners_in_the_same_place(stations, station):
     """To 3 cm if found in half of the revolutions, to 5 cm (a few points a wall, 11 mm noise) if in a fifth.

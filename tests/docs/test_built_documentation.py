@@ -69,6 +69,7 @@ def test_make_builds_it_as_strictly() -> None:
     assert "-m sphinx --builder html --fail-on-warning --keep-going --quiet --fresh-env" in makefile
 
 
+@pytest.mark.long
 def test_every_link_leads_somewhere(pages: dict[Path, Page]) -> None:
     dead = []
     for path, page in pages.items():
@@ -122,6 +123,7 @@ def url(built: Path) -> Iterator[str]:
     assert not thread.is_alive()
 
 
+@pytest.mark.long
 def test_a_browser_shows_it_under_the_content_policy(url: str) -> None:
     asked: list[str] = []
     wrong: list[str] = []

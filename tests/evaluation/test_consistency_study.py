@@ -37,6 +37,7 @@ def uninterrupted():
     return study(DESIGN)
 
 
+@pytest.mark.long
 def test_results_do_not_depend_on_the_number_of_workers(uninterrupted):
     assert (study(DESIGN, workers=2).sums == uninterrupted.sums).all()
 

@@ -27,6 +27,7 @@ def figure(found: Consistency, room: str, sigma: float, name: str) -> float:
     return found.row(room, SensorNoise(sigma, 0.001), "found", "ml", "consistent").figures[name].value
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sigma", SIGMAS)
 def test_ellipses_hold_95_of_100_corners_through_the_real_segmentation(
     found: Consistency, sigma: float

@@ -76,6 +76,7 @@ def standing(scans, seed=0, noise=NOISE, **settings):
     return list(islice(robot, scans))
 
 
+@pytest.mark.long
 def test_of_true_claims_coverage_and_area_are_right_however_few_scans_there_are():
     """Of 10 scans a residual from their own mean is 10 % smaller in variance: what is not corrected would show."""
     for scans in (10, 100):
@@ -334,6 +335,7 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing():
     assert len(study) == 0
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_of_a_real_sensor_moved_from_station_to_station_each_move_is_noticed(data):
     """401 revolutions at a station. The third move, of 0.2 m, one of two corners survives: that shows as a drift only,

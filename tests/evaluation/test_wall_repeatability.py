@@ -131,6 +131,7 @@ def test_a_recording_is_cut_where_the_sensor_was_put_elsewhere() -> None:
     assert [len(still) for still in standstills([*here, *there, *here[:30]])] == [60, 40, 30]
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_stations_that_a_file_tells_of_are_told_apart(data) -> None:
     found = stations(open_recording(data / "rplidar_csv_rooms" / "mapping_keng.csv.gz"))

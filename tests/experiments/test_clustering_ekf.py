@@ -115,6 +115,7 @@ def test_every_figure_is_there_and_nothing_is_fetched(report: str) -> None:
     assert report.count('class="line lost"') == 12
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("workers", [1, 2])
 def test_outcomes_come_in_the_order_of_the_trials_whoever_works(workers: int) -> None:
     told: list[None] = []

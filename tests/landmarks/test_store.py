@@ -249,6 +249,7 @@ Atlas(sys.argv[1]).delete(1)
 """
 
 
+@pytest.mark.long
 def test_a_deletion_that_is_killed_is_whole_and_the_next_one_frees_the_rest(tmp_path):
     path = tmp_path / "map.db"
     with Atlas(path) as atlas:

@@ -90,6 +90,7 @@ def float_and_map(rng: np.random.Generator) -> list[float]:
     return errors
 
 
+@pytest.mark.long
 def test_without_odometry_the_covariance_is_what_the_errors_show_from_the_first_tentative_landmarks_on() -> (
     None
 ):

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from walks import PERIOD, POSTS, START_COVARIANCE, sight, sighting, true_path, walk
 
 from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
@@ -130,6 +131,7 @@ def test_after_a_loop_every_post_is_in_the_map_once_and_where_it_stands() -> Non
     assert (np.einsum("li,lij,lj->l", error, np.linalg.inv(landmarks.covariance), error) < 18).all()
 
 
+@pytest.mark.long
 def test_the_map_covariance_stays_positive_definite_over_thousands_of_steps() -> None:
     slam, rng = Slam(SETTINGS), np.random.default_rng(3)
     pose = np.array([3.0, 2.0, 0.0])

@@ -70,6 +70,7 @@ def test_correlated_draws_are_worth_as_many_as_theory_says() -> None:
         assert worth(series) == pytest.approx(series.size * (1 - a) / (1 + a), rel=0.15)
 
 
+@pytest.mark.long
 def test_no_more_poses_are_outside_of_their_ellipsoids_than_chance_puts_there(
     runs: tuple[Array, Array, Array],
 ) -> None:

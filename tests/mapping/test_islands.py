@@ -78,6 +78,7 @@ def test_an_island_in_another_building_is_found_nowhere(around):
         assert islands.find(len(graph) - 1) is None
 
 
+@pytest.mark.long
 @pytest.mark.real_data
 def test_the_live_pose_is_lost_while_nobody_knows_how_an_island_lies(data):
     scans = list(open_recording(data / "carmen_radish_corrected" / "freiburg-101-corrected.log.gz"))

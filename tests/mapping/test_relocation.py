@@ -7,11 +7,11 @@ import pytest
 
 from lidarcore import Scan, SensorNoise
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import compose, pose_difference
+from lidarcore.geometry import UncertainPose, compose, pose_difference
 from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, write_ros_map
 from lidarcore.mapping.relocation import Relocator, query_of
-from lidarcore.mapping.relocation.field import FULL, make_field
-from lidarcore.mapping.relocation.search import best_pose, fit_at, top_nodes
+from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
+from lidarcore.mapping.relocation.search import best_pose, contradicted, fit_at, squares
 from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
 from lidarcore.simulation.rooms import rectangular_room
 
@@ -46,7 +46,9 @@ def test_branch_and_bound_finds_what_brute_force_finds():
             for y, x in np.argwhere(field.room[0] > 0).tolist()
         }
         best = max(fits.values())
-        nodes, bounds = top_nodes(field.levels, field.room, columns, rows, 0)
+        height, width = field.room.shape[1:]
+        everywhere = (LEVELS - 1, np.arange(7), (0, 0, width, height))
+        nodes, bounds = squares(field.levels, field.room, columns, rows, *everywhere, 0)
         order = np.argsort(-bounds, kind="stable")
         none = np.empty((0, 3), np.int32)
         fit, *place = best_pose(
@@ -138,3 +140,70 @@ def test_too_few_points_and_empty_maps_say_so():
         Relocator(OccupancyGrid(np.zeros((5, 5)), 0.05, np.zeros(3)))
     with pytest.raises(LocalizationError):
         query_of([])
+
+
+def guess(pose: np.ndarray, sigma: float = 0.1) -> UncertainPose:
+    return UncertainPose(pose, np.diag([sigma, sigma, 0.5 * sigma]) ** 2)
+
+
+def test_near_a_guess_only_places_near_it_are_rivals():
+    """A rectangle looks the same from the opposite pose; who knows roughly where the sensor is knows which."""
+    room, pose = rectangular_room(6, 4), np.array([1.2, 0.5, 0.3])
+    relocator, query = Relocator(mapped(room)), query_of([scan_at(room, pose)])
+    near = relocator.find_near(query, guess(pose + np.array([0.2, -0.15, 0.1])))
+    assert near.found
+    assert np.abs(pose_difference(near.pose, pose)).max() < 0.05
+    opposite = compose(np.array([0, 0, np.pi]), pose)
+    assert np.abs(pose_difference(relocator.find_near(query, guess(opposite)).pose, opposite)).max() < 0.05
+    assert relocator.find_near(query, guess(pose, 3.0)).verdict == "several places"
+
+
+def test_a_guess_where_the_sensor_is_not_is_contradicted():
+    room, pose = furnished_room(), np.array([7.6, 4.4, 1.0])
+    relocator, query = Relocator(furnished()), query_of([scan_at(room, pose)])
+    there = relocator.find_near(query, guess(pose))
+    assert there.found
+    for wrong in (
+        pose + np.array([-1.5, 0.5, 0.0]),
+        pose + np.array([0, 0, 1.5]),
+        pose + np.array([40.0, 0.0, 0.0]),
+    ):
+        found = relocator.find_near(query, guess(wrong))
+        assert not found.found
+        assert found.fit - found.against < there.fit - there.against - 0.5
+    assert relocator.find_near(query_of([Scan([1.0], [0.0])]), guess(pose)).verdict == "too few points"
+
+
+def test_a_ray_is_contradicted_by_what_it_goes_through_and_not_by_what_it_grazes():
+    """A wall along y = 0 and one along x = 5, cells of 5 cm; everything else is free."""
+    cells = np.zeros((120, 220), np.int8)
+    cells[20, :] = cells[:, 200] = 100
+    states = make_field(OccupancyGrid(cells, 0.05, np.zeros(3)), 0.1)
+    low = states.corner
+
+    def against(origin: tuple[float, float], end: tuple[float, float]) -> float:
+        ends = (np.array([point]) - low for point in (end, origin))
+        return contradicted(states.states, *ends)
+
+    assert against((60, 60), (60, 20.5)) == 0  # ends at the wall
+    assert against((10, 24), (150, 20.5)) == 0  # grazes it where it ends
+    assert against((10, 21), (200.5, 20.5)) == 0  # along it into the corner
+    assert against((60, 60), (60, 5)) == 1  # through it into the open
+    assert against((60, 60), (120, 60)) == 1  # ends in the open
+    assert against((60, 60), (60, 15)) == 0  # just behind it: the map may be that wrong
+
+
+def test_a_place_that_the_map_contradicts_a_little_more_is_a_rival_still():
+    """Two equal rooms, one of them known in part only; what was put into the other since does not make it that one."""
+    room = World(np.concatenate([rectangular_room(7, 5).walls, [[[-1.0, -2.5], [-1.0, 0.4]]]]))
+    one, pose = mapped(room), np.array([1.5, 0.5, 0.3])
+    other = one.cells.copy()
+    columns = slice(one.cells_of(pose[None, :2])[0, 1], None)
+    other[:, columns] = np.where(other[:, columns] == 0, -1, other[:, columns])
+    both = OccupancyGrid(
+        np.hstack([one.cells, np.full((len(other), 40), -1), other]), one.resolution, one.origin
+    )
+    scan = scan_at(room, pose)
+    new = np.sin(40 * scan.bearings) > np.cos(0.07 * np.pi)  # 7 % of the beams end in the open
+    seen = Scan(np.where(new, 0.6 * scan.ranges, scan.ranges), scan.bearings)
+    assert Relocator(both).find(query_of([seen])).verdict in ("several places", "no fit")

@@ -182,6 +182,7 @@ HOSTILE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", HOSTILE)
 def test_hostile_files_are_refused_fast_and_in_little_memory(tmp_path, name):
     make, text = HOSTILE[name]

@@ -220,6 +220,7 @@ def test_unplugging_at_any_moment_of_connecting_is_an_error_and_no_hang(sensor: 
         next(iter(driver))
 
 
+@pytest.mark.long
 def test_faults_in_combination_are_survived(sensor: EmulatorProcess) -> None:
     dice = random.Random(7)
     faults = (

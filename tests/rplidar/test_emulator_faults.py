@@ -63,6 +63,7 @@ def test_capsules_come_at_the_pace_of_an_s1_and_cost_little(emulator, line):
     assert now.user + now.system - used.user - used.system < 0.2 * 450 * CAPSULE
 
 
+@pytest.mark.long
 def test_legacy_nodes_come_at_the_pace_of_an_s1(line):
     line.scan(SCAN, LEGACY)
     line.read(5 * 160)

@@ -105,6 +105,7 @@ def test_a_capture_is_answered_and_sent_as_it_was_captured(tmp_path):
         assert soonest(duration, 20 * APART + 0.2) < 20 * APART + 0.2
 
 
+@pytest.mark.long
 def test_a_capture_that_began_in_the_middle_of_a_scan_is_announced(tmp_path):
     capture(tmp_path / "capture", [("in", piece) for piece in PIECES], Stream(0x85, 108.0))
     with EmulatorProcess(replay=tmp_path / "capture") as emulator, line_to(emulator) as line:

@@ -85,6 +85,7 @@ def assert_sound(revolution: Revolution) -> None:
     assert len(revolution.scan()) == len(revolution)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("nonsense", [randomly, with_headers_everywhere, almost_rightly])
 @pytest.mark.parametrize("answer", PACKETS, ids=lambda answer: Answer(answer).name.lower())
 def test_nonsense_is_survived_and_accounted_for(answer: int, nonsense) -> None:

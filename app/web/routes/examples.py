@@ -191,6 +191,7 @@ SESSION = {
     "ended": None,
     "landmarks": 27,
     "walls": 0,
+    "grid": False,
 }
 SUGGESTION = {"mask": [{"first": 2.93, "last": -3.07, "reach": 0.31}]}
 SETTINGS_PATCH = {"extraction": {"fitter": "wctls", "min_points": 8}, "view": {"compare": True}}

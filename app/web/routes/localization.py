@@ -35,7 +35,7 @@ ROW = {
     "sigma_x": 0.004, "sigma_y": 0.005, "sigma_heading": 0.002,
 }  # fmt: skip
 FED = {"taken": 1204, "refused": 0, "dropped": 0, "stamp": 1795255000.1, "used": True, "problem": None}
-STATE = {"mode": "slam", "session": 3, "map": None, "problem": None, "odometry": FED}
+STATE = {"mode": "slam", "method": "landmarks", "session": 3, "map": None, "problem": None, "odometry": FED}
 ODOMETRY = {"stamp": 1795255000.1, "x": 1.2, "y": -0.3, "heading": 0.5}
 ONE = OdometryPose.model_json_schema()
 ONE_OR_SOME = {"anyOf": [ONE, {"type": "array", "items": ONE}], "examples": [ODOMETRY]}

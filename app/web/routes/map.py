@@ -8,11 +8,13 @@ from zipfile import ZipFile
 
 import anyio
 from fastapi import APIRouter, Query, Request
+from PIL import Image
 from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import FileResponse
 
 from lidarcore.landmarks import Session, export_map, export_picture
+from lidarcore.mapping.grid import shades_of, write_ros_map
 
 from ...jobs.landmark_store import LandmarkStore
 from ..problems import ProblemError, documented
@@ -32,6 +34,7 @@ FILES: dict[str, Any] = {
     "application/json": {"schema": {"type": "object", "examples": [EXAMPLE]}},
     "text/csv": {"schema": {"type": "string"}},
     "application/geo+json": {"schema": {"type": "object"}},
+    "application/zip": {"schema": {"type": "string", "format": "binary"}},
 }
 
 
@@ -49,11 +52,14 @@ async def download(
     session: SessionId = None,
     format: Annotated[
         Literal["json", "csv", "geojson", "png", "zip"],
-        Query(description="zip: map.png and map.yaml as ROS map_server reads them; png: the picture alone"),
+        Query(description="zip: image and map.yaml as ROS map_server reads them; png: the picture alone"),
     ] = "json",
     resolution: Annotated[float, Query(ge=1e-3, le=1e3, description="m a pixel, of a picture")] = 0.05,
 ) -> FileResponse:
-    """All landmarks of a session, in metres in its world frame. Made for one request at a time: others wait."""
+    """All landmarks of a session, in metres in its world frame. Made for one request at a time: others wait.
+
+    If it has an occupancy grid, the picture is of that, in its own resolution.
+    """
     make = partial(_file, landmarks, session, format, resolution)
     return await anyio.to_thread.run_sync(make, limiter=heavy)
 
@@ -67,12 +73,20 @@ async def download(
 async def upload(
     request: Request,
     landmarks: CurrentLandmarks,
-    format: Annotated[Literal["json", "csv", "geojson"], Query(description="of the body")] = "json",
+    format: Annotated[
+        Literal["json", "csv", "geojson", "zip"],
+        Query(
+            description="of the body; zip: a grid, map.yaml with its image as ROS and `lidarcore map` write them"
+        ),
+    ] = "json",
     name: Annotated[
         str, Query(min_length=1, max_length=200, description="what the session is said to come from")
     ] = "a file",
 ) -> Session:
-    """Load a map: the body is a file as GET gives it. It becomes a session of its own if all of it makes sense."""
+    """Load a map: the body is a file as GET gives it, or a grid of ROS. It becomes a session if all of it makes sense.
+
+    What has a grid is localized in by whole scans, other maps by their landmarks.
+    """
     if not name.isprintable():
         raise ProblemError(422, f"name is {name!r}: give printable text.")
     with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder:
@@ -90,7 +104,12 @@ def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution
     folder = tempfile.TemporaryDirectory(prefix="lidarcore-map-")
     try:
         path = Path(folder.name) / f"map.{format}"
-        if format in PICTURES:
+        grid = landmarks.grid(landmark_map.session) if format in PICTURES else None
+        if grid is not None and format == "zip":
+            write_ros_map(grid, path.with_suffix(".yaml"))
+        elif grid is not None:
+            Image.fromarray(shades_of(grid)).save(path)
+        elif format in PICTURES:
             export_picture(landmark_map, path.with_suffix(".png"), resolution, MOST_PIXELS)
         else:
             export_map(landmark_map, path)
@@ -106,5 +125,6 @@ def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution
 def _pack(path: Path) -> None:
     """Put the picture and what says where it is into one file."""
     with ZipFile(path, "w") as archive:
-        for part in (path.with_suffix(".png"), path.with_suffix(".yaml")):
-            archive.write(part, part.name)
+        for part in sorted(path.parent.iterdir()):
+            if part != path:
+                archive.write(part, part.name)

@@ -1,6 +1,6 @@
-"""Distances and angles between what a scan shows, with their standard deviations."""
+"""Distances and angles between walls and corners, of a scan or of the map, with their standard deviations."""
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal, NamedTuple, cast
 
 import numpy as np
 from fastapi import APIRouter, Query
@@ -8,12 +8,14 @@ from typing_extensions import TypedDict
 
 from lidarcore import Array
 from lidarcore.geometry import act
+from lidarcore.mapping import measure as of_map
+from lidarcore.mapping import scan_measure as of_scan
 from lidarcore.mapping.measure import Feature
-from lidarcore.mapping.scan_measure import angle, distance
+from lidarcore.mapping.walls import Walls
 
 from ...errors import NotFoundError
 from ...pipeline.frame import Frame
-from ..problems import documented
+from ..problems import ProblemError, documented
 from ..schemas import Pair
 from .dependencies import CurrentFrame
 from .examples import ok
@@ -21,21 +23,33 @@ from .examples import ok
 router = APIRouter(prefix="/measure", tags=["frame"], responses=documented(404, 422))
 
 SNAP = 0.3  # m; what is farther away was not meant
+MIXED = "One place is of the scan, the other of the map: give two of the scan, or two of the map."
+NO_WALLS = (
+    "The frame shows no walls of a map: set navigation.mode to slam and navigation.method to scans, and wait."
+)
+
+_Candidates = tuple[list[Feature], list[int], Array]  # each with its id, and its place (N, 2) m that is meant
 
 Place = Annotated[
     str,
     Query(
-        pattern=r"^(corner|wall)@-?\d{1,6}(\.\d{1,12})?,-?\d{1,6}(\.\d{1,12})?$",
-        description="corner@x,y or wall@x,y: the nearest one to a place, m, in the frame of the map or of the sensor",
+        pattern=r"^(map-)?(corner|wall)@-?\d{1,6}(\.\d{1,12})?,-?\d{1,6}(\.\d{1,12})?$",
+        description="corner@x,y or wall@x,y: the nearest of the scan to a place, m, in the frame of the map or of the "
+        "sensor; map-corner@x,y or map-wall@x,y: of the map of whole scans",
         examples=["corner@3.1,1.99"],
     ),
 ]
 
 
-class MeasuredFeatureJson(TypedDict):
-    """`id` of a corner as frames have it, of a wall its number in this frame; `at`, the place on it, m."""
+Kind = Literal["corner", "wall", "map-corner", "map-wall"]
 
-    kind: Literal["corner", "wall"]
+
+class MeasuredFeatureJson(TypedDict):
+    """`id` of a corner as frames have it, of a wall its number in this frame, of a wall of the map its id; `at`, the
+    place on it, m. Corners of the map have no ids that last: theirs is the number among them now.
+    """
+
+    kind: Kind
     id: int
     at: Pair
 
@@ -65,17 +79,24 @@ class _Found(NamedTuple):
 
 @router.get("", responses=ok(EXAMPLE, "The distance, and the angle between walls"))
 def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
-    """How far two corners or walls of the current frame are from each other, and how sure that is.
+    """How far two corners or walls of the current frame, or of its map, are from each other, and how sure that is.
 
     From a corner to a wall: across its line; between walls: across, on the average. 404 if nothing is near a place, or
-    both places name the same thing.
+    both places name the same thing; 422 if one is of the scan and the other of the map, which err together in ways that
+    nobody knows.
     """
+    if first.startswith("map-") != second.startswith("map-"):
+        raise ProblemError(422, MIXED)
     a, b = (_nearest(frame, place) for place in (first, second))
     if a.feature == b.feature:
         raise NotFoundError("Both places are at the same thing: give places at two.")
-    found = distance(frame.main, a.feature, b.feature)
     walls = a.feature.kind == b.feature.kind == "wall"
-    turn = angle(frame.main, a.feature, b.feature) if walls else None
+    if first.startswith("map-"):
+        found = of_map.distance(_map(frame), a.feature, b.feature)
+        turn = of_map.angle(_map(frame), a.feature, b.feature) if walls else None
+    else:
+        found = of_scan.distance(frame.main, a.feature, b.feature)
+        turn = of_scan.angle(frame.main, a.feature, b.feature) if walls else None
     return {
         "first": a.said,
         "second": b.said,
@@ -87,26 +108,44 @@ def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
 
 
 def _nearest(frame: Frame, place: str) -> _Found:
-    """The corner or wall of the main method that a place means. Raises NotFoundError."""
+    """The corner or wall that a place means. Raises NotFoundError."""
     kind, _, xy = place.partition("@")
     at = np.array([float(value) for value in xy.split(",")])
+    features, ids, spots = _of_map(frame, kind, at) if kind.startswith("map-") else _of_scan(frame, kind, at)
+    ways = np.hypot(*(spots - at).T)
+    if not len(ways) or ways.min() > SNAP:
+        raise NotFoundError(f"There is no {kind} within {SNAP} m of {xy}: give a place at one.")
+    nearest = int(ways.argmin())
+    x, y = spots[nearest].tolist()
+    return _Found(features[nearest], {"kind": cast(Kind, kind), "id": ids[nearest], "at": (x, y)})
+
+
+def _of_scan(frame: Frame, kind: str, at: Array) -> _Candidates:
+    """Those of the main method."""
     if kind == "corner":
         main = next(iter(frame.features))
         ids = {row.index[main]: row.id for row in frame.corners if main in row.index}
         spots = act(frame.pose, frame.main.corners.xy)
-    else:
-        ids = {i: i for i in range(len(frame.main.segments))}
-        start, end = (act(frame.pose, p) for p in (frame.main.segments.start, frame.main.segments.end))
-        spots = _closest(at, start, end)
-    ways = np.hypot(*(spots - at).T)
-    if not len(ways) or ways.min() > SNAP:
-        raise NotFoundError(f"There is no {kind} within {SNAP} m of {xy}: give a place at one of the frame.")
-    index = int(ways.argmin())
-    x, y = spots[index].tolist()
-    return _Found(
-        Feature("corner" if kind == "corner" else "wall", index),
-        {"kind": "corner" if kind == "corner" else "wall", "id": ids[index], "at": (x, y)},
-    )
+        return [Feature("corner", i) for i in range(len(spots))], [ids[i] for i in range(len(spots))], spots
+    start, end = (act(frame.pose, p) for p in (frame.main.segments.start, frame.main.segments.end))
+    numbers = list(range(len(start)))
+    return [Feature("wall", i) for i in numbers], numbers, _closest(at, start, end)
+
+
+def _of_map(frame: Frame, kind: str, at: Array) -> _Candidates:
+    walls = _map(frame)
+    if kind == "map-corner":
+        numbers = list(range(len(walls.corners)))
+        return [Feature("corner", i) for i in numbers], numbers, walls.corners.xy
+    ids = walls.ids.tolist()
+    return [Feature("wall", id) for id in ids], ids, _closest(at, walls.ends[:, 0], walls.ends[:, 1])
+
+
+def _map(frame: Frame) -> Walls:
+    """The walls that the frame shows. Raises NotFoundError."""
+    if frame.picture is None or frame.picture.walls is None:
+        raise NotFoundError(NO_WALLS)
+    return frame.picture.walls
 
 
 def _closest(at: Array, start: Array, end: Array) -> Array:

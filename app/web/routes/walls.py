@@ -3,7 +3,7 @@
 import io
 import math
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
@@ -27,7 +27,8 @@ from ...errors import NotFoundError
 from ...jobs.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
 from ..problems import ProblemError, documented, encode
-from ..schemas import Finite, Matrix, Pair
+from ..schemas import Finite
+from ..wall_json import WallJson, wall_rows
 from .dependencies import CurrentLandmarks, CurrentRuntime, Heavy
 from .examples import MEDIA_TYPES, ok
 from .landmarks import USUAL, Limit, Metres, Region
@@ -47,29 +48,6 @@ WALL = {
     "first_seen": 1795255000.1, "last_seen": 1795255031.4, "count": 41,
 }  # fmt: skip
 CSV = "id,alpha_rad,r_m,x1_m,y1_m,x2_m,y2_m,length_m,..."
-
-
-class WallJson(TypedDict):
-    """A surface seen from one side: x cos(alpha) + y sin(alpha) = r, rad and m, in the frame of the map.
-
-    `covariance` is of (alpha, r); `ended` is false at an end beyond which the wall may go on, for nobody looked there;
-    `count` keyframes saw it. `id` stays while the map grows and bends, and is not given twice in one map. Walls that
-    become one keep the oldest id; the longest part of a wall that is cut keeps its id.
-    """
-
-    id: int
-    alpha: float
-    r: float
-    covariance: Matrix
-    start: Pair
-    end: Pair
-    length: float
-    length_variance: float
-    ended: tuple[bool, bool]
-    in_corner: tuple[bool, bool]
-    first_seen: float
-    last_seen: float
-    count: int
 
 
 class WallsJson(TypedDict):
@@ -146,7 +124,7 @@ def walls(
     """
     chosen = np.flatnonzero(which(asked) & _within(asked, region)).tolist()
     if format == "json":
-        return encode({"walls": _rows(asked, chosen)})
+        return encode({"walls": wall_rows(asked, chosen)})
     text = walls_csv(asked, chosen) if format == "csv" else walls_geojson(asked, chosen)
     return Response(text, media_type=MEDIA_TYPES[format])
 
@@ -166,7 +144,7 @@ def nearest_walls(
     """The k walls nearest to a point, and how far from it they are between their ends. 404 if there is no map."""
     wanted, far = which(asked), distances(asked, (x, y))
     chosen = [i for i in nearest(asked, (x, y), len(asked)).tolist() if wanted[i]][:k]
-    return encode({"walls": _rows(asked, chosen), "distances": far[chosen].tolist()})
+    return encode({"walls": wall_rows(asked, chosen), "distances": far[chosen].tolist()})
 
 
 @router.get(
@@ -196,8 +174,8 @@ def history(
     return encode(
         {
             "session": session,
-            "wall": next(iter(_rows(present, range(len(present)))), None),
-            "history": _rows(found, range(len(found))),
+            "wall": next(iter(wall_rows(present, range(len(present)))), None),
+            "history": wall_rows(found, range(len(found))),
             "next": float(found.last_seen[-1]) if len(found) == limit else None,
         }
     )
@@ -267,23 +245,3 @@ def _picture(runtime: Runtime) -> MapPicture:
         return found
     makes_one = wanted.mode == "slam" and wanted.method == "scans"
     raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
-
-
-def _rows(walls: WallTable, chosen: Sequence[int]) -> list[WallJson]:
-    columns = {
-        "id": walls.ids.tolist(),
-        "alpha": walls.alpha.tolist(),
-        "r": walls.r.tolist(),
-        "covariance": walls.line_covariance.tolist(),
-        "start": walls.ends[:, 0].tolist(),
-        "end": walls.ends[:, 1].tolist(),
-        "length": walls.length.tolist(),
-        "length_variance": walls.length_variance.tolist(),
-        "ended": walls.ended.tolist(),
-        "in_corner": walls.in_corner.tolist(),
-        "first_seen": walls.first_seen.tolist(),
-        "last_seen": walls.last_seen.tolist(),
-        "count": walls.count.tolist(),
-    }
-    rows = list(zip(*columns.values(), strict=True))
-    return [WallJson(**dict(zip(columns, rows[i], strict=True))) for i in chosen]  # type: ignore[typeddict-item]

@@ -16,6 +16,8 @@ FULL = 200
 """Fit of a point in an occupied cell."""
 LEVELS = 7
 """Sides of the squares: 1, 2, 4 ... 64 cells."""
+OCCUPIED, OPEN = 1, 2
+"""States of cells; any other is neither, or not known."""
 _MOST_CELLS = 20_000_000
 _MARGIN = 1 << (LEVELS - 1)
 
@@ -26,7 +28,7 @@ class Field:
 
     levels  (LEVELS, H, W) best fit of the square of 2^level cells that begins at a cell
     room    (LEVELS, H, W) 1 where such a square holds a cell in which a sensor may be
-    states  (H, W) 1 occupied, 2 free and not near anything occupied, 0 anything else
+    states  (H, W) OCCUPIED; OPEN: free and not near anything occupied; 0 anything else
     corner  (2,) column and row in the grid of the first cell
     """
 
@@ -50,7 +52,7 @@ def make_field(grid: OccupancyGrid, reach: float) -> Field:
     occupied, free = (_part(mask, low, shape) for mask in (grid.occupied, grid.free))
     distance = distance_transform_edt(~occupied) * grid.resolution
     fit = np.rint(FULL * np.exp(-((distance / reach) ** 2) / 2)).astype(np.uint8)
-    states = np.where(occupied, 1, np.where(free & (distance > 3 * reach), 2, 0)).astype(np.uint8)
+    states = np.where(occupied, OCCUPIED, np.where(free & (distance > 3 * reach), OPEN, 0)).astype(np.uint8)
     room = binary_dilation(free, iterations=1).astype(np.uint8)
     return Field(_pyramid(fit), _pyramid(room), states, low)
 

@@ -1,24 +1,25 @@
 """The pose in a known map: the algorithm on one screen."""
 
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from lidarcore.arrays import Array
-from lidarcore.geometry import compose
+from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import UncertainPose, compose, inverse, largest_variance, wrap
 from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.relocation.field import FULL, make_field
+from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
 from lidarcore.mapping.relocation.query import Query
 from lidarcore.mapping.relocation.refine import refined
-from lidarcore.mapping.relocation.search import best_pose, contradicted, top_nodes
+from lidarcore.mapping.relocation.search import best_pose, contradicted, fit_at, squares
 from lidarcore.mapping.relocation.settings import RelocationSettings
 
 Verdict = Literal["found", "too few points", "no fit", "several places"]
 
 _APART = (0.8, 0.35)  # m, rad: poses closer than both are one place
-_TRIES = 12  # rivals that are contradicted, after which the rest is taken for one that is not
-_SKIP = 0.4  # m before a ray's end in which something occupied is what it hit
+_MOST_PLACES = 12  # where the points fit, from which on nothing tells them apart
+_SIGMAS = 3.0  # of a guess, within which a pose is looked for
+_NEAR_LEVEL = 3  # of the squares in which it is, at least
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,7 +31,7 @@ class Relocation:
     covariance  (3, 3) of the pose
     fit         0 to 1: how well the points lie on what stands
     against     share of the rays that the map contradicts
-    rival       fit of the best other place that is not contradicted, 0 if it is below what counts
+    rival       fit of the best other place that may be the true one, 0 if there is none
     """
 
     verdict: Verdict
@@ -46,6 +47,18 @@ class Relocation:
         return self.verdict == "found"
 
 
+class _Place(NamedTuple):
+    """How well the points fit at a pose (3,) in cells of the field, and the share of rays that the map contradicts."""
+
+    fit: float
+    against: float
+    pose: Array
+
+
+def _worth(place: _Place) -> float:
+    return place.fit - place.against
+
+
 class Relocator:
     """Finds poses in one map. Making it takes a moment; it may be asked from several threads.
 
@@ -58,45 +71,99 @@ class Relocator:
 
     def find(self, query: Query) -> Relocation:
         """Where the last scan of a query was taken."""
-        s, points = self.settings, query.points / self._grid.resolution
-        if len(points) < s.least_points:
+        if len(query.points) < self.settings.least_points:
             return _nowhere("too few points")
-        angles = self._angles(points)
-        columns, rows = _turned(points, angles)
-        field, full = self._field, FULL * len(points)
-        least = int(s.fit * full)
-        nodes, bounds = top_nodes(field.levels, field.room, columns, rows, int(s.rival * least))
+        height, width = self._field.room.shape[1:]
+        angles = self._angles(query)
+        found = self._best(
+            query, angles, np.arange(len(angles)), LEVELS - 1, (0, 0, width, height), self.settings.against
+        )
+        return found or _nowhere("no fit")
+
+    def find_near(self, query: Query, guess: UncertainPose) -> Relocation:
+        """Likewise, within three standard deviations of a guess T_world_sensor; if it is not there, how well that fits.
+
+        Only places near the guess are rivals. Rays that the map contradicts weigh against a place, but forbid none:
+        something may have changed since the map was made.
+        """
+        angles, at = self._angles(query), self._in_field(guess.pose)
+        if len(query.points) < self.settings.least_points:
+            return _nowhere("too few points")
+        turn = max(_SIGMAS * np.sqrt(guess.covariance[2, 2]), _APART[1])
+        near = np.flatnonzero(np.abs(wrap(angles - at[2])) <= turn)
+        spread = _SIGMAS * np.sqrt(float(largest_variance(guess.covariance[:2, :2])))
+        away = max(spread, _SIGMAS * self.settings.reach) / self._grid.resolution
+        ends = np.clip([at[:2] - away, at[:2] + away + 1], 0, self._field.room.shape[:0:-1])
+        left, low, right, high = ends.astype(int).ravel().tolist()
+        level = int(np.clip(np.log2(away) - 1, _NEAR_LEVEL, LEVELS - 1))
+        box = left, low, right, high
+        return self._best(query, angles, near, level, box, against=1.0) or self._as_guessed(query, at)
+
+    def _best(
+        self,
+        query: Query,
+        angles: Array,
+        tried: Ints,
+        level: int,
+        box: tuple[int, int, int, int],
+        against: float,
+    ) -> Relocation | None:
+        """The best pose at some of the angles in a box of cells, if the points fit at one."""
+        s, field = self.settings, self._field
+        columns, rows = _turned(query.points / self._grid.resolution, angles)
+        full = FULL * len(query.points)
+        threshold = int(s.fit * full)
+        nodes, bounds = squares(
+            field.levels, field.room, columns, rows, level, tried, box, int(s.rival * threshold)
+        )
         order = np.argsort(-bounds, kind="stable")
         apart = int(_APART[1] / (angles[1] - angles[0])), int(_APART[0] / self._grid.resolution)
         taken = np.empty((0, 3), np.int32)
-        best = None
-        threshold = least
-        for _ in range(_TRIES):
+        places: list[_Place] = []
+        for _ in range(_MOST_PLACES):
             fit, *place = best_pose(
                 field.levels, field.room, columns, rows, nodes, bounds, order, threshold, taken, apart
             )
             if fit < 0:
                 break
             pose = self._pose(angles, place)
-            against = self._against(query, pose)
             taken = np.vstack([taken, np.array([place], np.int32)])
-            if against > s.against:
-                continue
-            if best is None:
-                best, threshold = (fit / full, against, pose), int(s.rival * fit)
-            else:
-                return self._relocation(query, *best, rival=fit / full)
-        return _nowhere("no fit") if best is None else self._relocation(query, *best, rival=0.0)
+            places.append(_Place(fit / full, self._against(query, pose), pose))
+            threshold = int(full * max(s.rival * max(places, key=_worth).fit, s.fit))
+        return self._judged(query, places, against) if places else None
 
-    def _relocation(self, query: Query, fit: float, against: float, pose: Array, rival: float) -> Relocation:
-        pose, covariance = refined(self._field, query.points / self._grid.resolution, pose)
-        verdict: Verdict = "several places" if rival > 0 else "found"
-        if fit - against < self.settings.fit:
+    def _judged(self, query: Query, places: list[_Place], against: float) -> Relocation:
+        """The best of the places at which the points fit, and whether it stands alone."""
+        s = self.settings
+        best = max(places, key=_worth)
+        rivals = [
+            other.fit
+            for other in places
+            if other is not best
+            and other.fit >= s.rival * best.fit
+            and other.against <= best.against + s.against
+        ]
+        verdict: Verdict = "found"
+        if _worth(best) < s.fit or best.against > against:
             verdict = "no fit"
-        return Relocation(verdict, *self._in_world(pose, covariance), fit, against, rival)
+        elif rivals or len(places) == _MOST_PLACES:
+            verdict = "several places"
+        pose, covariance = refined(self._field, query.points / self._grid.resolution, best.pose)
+        return Relocation(
+            verdict, *self._in_world(pose, covariance), best.fit, best.against, max(rivals, default=0.0)
+        )
 
-    def _angles(self, points: Array) -> Array:
+    def _as_guessed(self, query: Query, at: Array) -> Relocation:
+        """How well a pose (3,) in cells of the field fits, which is not found."""
+        columns, rows = _turned(query.points / self._grid.resolution, at[2:])
+        column, row = np.floor(at[:2]).astype(int).tolist()
+        fit = fit_at(self._field.levels[0], columns[0], rows[0], column, row, 0) / FULL / len(query.points)
+        nowhere = _nowhere("no fit")
+        return replace(nowhere, fit=fit, against=self._against(query, at))
+
+    def _angles(self, query: Query) -> Array:
         """Headings at steps by which the farther points move about as far as they may lie beside the map."""
+        points = query.points / self._grid.resolution
         far = float(np.quantile(np.hypot(*points.T), 0.8))
         step = 1.2 * self.settings.reach / self._grid.resolution / max(far, 20.0)
         return np.linspace(-np.pi, np.pi, int(np.ceil(2 * np.pi / step)), endpoint=False)
@@ -109,7 +176,12 @@ class Relocator:
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[c, s], [-s, c]]) / self._grid.resolution
         points, origins = query.points @ turn + pose[:2], query.origins @ turn + pose[:2]
-        return float(contradicted(self._field.states, points, origins, _SKIP / self._grid.resolution))
+        return float(contradicted(self._field.states, points, origins))
+
+    def _in_field(self, pose: Array) -> Array:
+        """A pose (3,) in the world in cells of the field."""
+        x, y, heading = compose(inverse(self._grid.origin), pose)
+        return np.array([*(np.array([x, y]) / self._grid.resolution - self._field.corner), heading])
 
     def _in_world(self, pose: Array, covariance: Array) -> tuple[Array, Array]:
         """A pose in cells of the field and its covariance, in metres of the world."""

@@ -5,32 +5,39 @@ from numpy.typing import NDArray
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
-from lidarcore.mapping.relocation.field import FULL, LEVELS
+from lidarcore.mapping.relocation.field import FULL, LEVELS, OCCUPIED, OPEN
 
 Bytes = NDArray[np.uint8]
 Shorts = NDArray[np.int32]
-_TOP = LEVELS - 1
 
 
 @kernel
-def top_nodes(levels: Bytes, room: Bytes, columns: Shorts, rows: Shorts, least: int) -> tuple[Shorts, Shorts]:
-    """Squares of the largest size at every angle that may hold a pose of at least that fit: nodes, and their bounds.
+def squares(
+    levels: Bytes,
+    room: Bytes,
+    columns: Shorts,
+    rows: Shorts,
+    level: int,
+    angles: Ints,
+    box: tuple[int, int, int, int],
+    least: int,
+) -> tuple[Shorts, Shorts]:
+    """Squares of one size, at some of the angles, that may hold a pose of at least that fit: nodes, and their bounds.
 
-    columns, rows (A, N): cells of the points at each of A angles, relative to the sensor. A node is (level, angle,
-    column, row).
+    columns, rows (A, N): cells of the points at each of A angles, relative to the sensor. box: first column and row,
+    and those behind the last. A node is (level, angle, column, row).
     """
-    side = 1 << _TOP
-    height, width = room.shape[1:]
-    most = len(columns) * ((height + side - 1) // side) * ((width + side - 1) // side)
+    side = 1 << level
+    most = len(angles) * ((box[3] - box[1] + side - 1) // side) * ((box[2] - box[0] + side - 1) // side)
     nodes, bounds, n = np.empty((most, 4), np.int32), np.empty(most, np.int32), 0
-    for row in range(0, height, side):
-        for column in range(0, width, side):
-            if room[_TOP, row, column] == 0:
+    for row in range(box[1], box[3], side):
+        for column in range(box[0], box[2], side):
+            if room[level, row, column] == 0:
                 continue
-            for a in range(len(columns)):
-                bound = fit_at(levels[_TOP], columns[a], rows[a], column, row, least)
+            for a in angles:
+                bound = fit_at(levels[level], columns[a], rows[a], column, row, least)
                 if bound >= least:
-                    nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = _TOP, a, column, row
+                    nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = level, a, column, row
                     bounds[n] = bound
                     n += 1
     return nodes[:n], bounds[:n]
@@ -65,7 +72,7 @@ def best_pose(
 ) -> tuple[int, int, int, int]:
     """The pose of the best fit, at least that: fit, angle, column and row; -1 if there is none.
 
-    Poses within `apart` (angles, cells) of those taken (T, 3) do not count. nodes are those of `top_nodes`, the best
+    Poses within `apart` (angles, cells) of those taken (T, 3) do not count. nodes are those of `squares`, the best
     first by `order`.
     """
     best, found = least - 1, (-1, 0, 0, 0)
@@ -147,20 +154,22 @@ def _is_taken(taken: Shorts, a: int, column: int, row: int, angles: int, apart: 
 
 
 @kernel
-def contradicted(states: Bytes, points: Array, origins: Array, skip: float) -> float:
+def contradicted(states: Bytes, points: Array, origins: Array) -> float:
     """Share of rays, from origins to points (N, 2) in cells, that the map contradicts.
 
-    A ray is contradicted if it goes through something occupied more than `skip` cells before its end, or ends where
-    all around is free.
+    A ray is contradicted if it goes through something occupied and on into the open, or ends in the open. One that only
+    grazes the wall on which it ends is not.
     """
     wrong = 0
     for k in range(len(points)):
         dx, dy = points[k, 0] - origins[k, 0], points[k, 1] - origins[k, 1]
-        length = np.hypot(dx, dy)
-        bad = _state(states, points[k, 0], points[k, 1]) == 2
-        steps = int(length - skip)
-        for step in range(int(skip), steps):
-            if _state(states, origins[k, 0] + dx * step / length, origins[k, 1] + dy * step / length) == 1:
+        steps = int(np.hypot(dx, dy)) + 1
+        bad = _state(states, points[k, 0], points[k, 1]) == OPEN
+        is_through = False
+        for step in range(steps):
+            state = _state(states, origins[k, 0] + dx * step / steps, origins[k, 1] + dy * step / steps)
+            is_through |= state == OCCUPIED
+            if is_through and state == OPEN:
                 bad = True
                 break
         wrong += bad

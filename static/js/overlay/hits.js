@@ -5,9 +5,10 @@ export const FINGER_PX = 24;
 const WALL_PX = 6;
 const SPECK_PX = 4;
 
-/** The thing of a world that is nearest to a pixel and near enough; marks go before walls, which are large. Else null. */
-export function thingAt(world, layers, look, pixel, within = MOUSE_PX) {
-  return nearestMark(marksOf(world, layers), look, pixel, within) ?? nearestWall(world, layers, look, pixel);
+/** What of a world is at a pixel, or near enough: a mark, else walls, which are large. */
+export function thingsAt(world, layers, look, pixel, within = MOUSE_PX) {
+  const mark = nearestMark(marksOf(world, layers), look, pixel, within);
+  return mark ? [mark] : wallsAt(world, layers, look, pixel);
 }
 
 /** The measured point or, beside all of them, the point of the trail at a pixel, of those `around`; else null. */
@@ -22,12 +23,15 @@ export function chosenAt(world, layers, look, pixel, within) {
   return { corner: nearest("corner")?.id, landmark: nearest("landmark")?.id };
 }
 
-/** The corner or wall at a pixel, and the place on it: what can be measured from. Else null. */
+/** What can be measured from at a pixel: {scan, map}, in each {kind, at} of a corner or wall, or null. */
 export function measurableAt(world, look, pixel, within) {
-  const corner = nearestMark(world.corners, look, pixel, within);
-  if (corner) return { kind: "corner", at: corner.at };
-  const wall = nearestWall(world, { segments: true }, look, pixel, within);
-  return wall && { kind: "wall", at: nearestOn(wall.ends, look.toFloor(pixel)) };
+  const of = ({ corners, walls }, prefix) => {
+    const corner = nearestMark(corners, look, pixel, within);
+    if (corner) return { kind: `${prefix}corner`, at: corner.at };
+    const wall = nearestWall(walls, look, pixel, within);
+    return wall && { kind: `${prefix}wall`, at: nearestOn(wall.ends, look.toFloor(pixel)) };
+  };
+  return { scan: of(world, ""), map: of(world.mapped, "map-") };
 }
 
 /** The place on a stretch between two ends that is nearest to a place. */
@@ -54,9 +58,13 @@ function nearestMark(marks, look, pixel, within) {
   return best;
 }
 
-/** The wall at a pixel, if walls are shown; else null. */
-export function nearestWall({ walls }, layers, look, pixel, within = WALL_PX) {
-  if (!layers.segments) return null;
+/** The walls at a pixel, of those that are shown: the scan's, and the map's, which lies below it. */
+export function wallsAt({ walls, mapped }, layers, look, pixel, within) {
+  const shown = [layers.segments ? walls : [], layers.walls ? mapped.walls : []];
+  return shown.map((some) => nearestWall(some, look, pixel, within)).filter(Boolean);
+}
+
+function nearestWall(walls, look, pixel, within = WALL_PX) {
   let best = null;
   let least = within;
   for (const wall of walls) {

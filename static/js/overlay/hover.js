@@ -2,12 +2,13 @@
 
 import { $, el, remake } from "../dom.js";
 import { axesOf } from "./ellipses.js";
-import { degrees, duration, fineDegrees, metres, millimetres, wholeNumber } from "../units.js";
+import { slant } from "../mapped.js";
+import { degrees, duration, fineDegrees, metres, millimetres, moment, wholeNumber } from "../units.js";
 
 const AWAY_PX = 16; // from the pointer
 
 const SAID = {
-  corner: cornerSaid, wall: wallSaid, landmark: landmarkSaid, rejection: rejectionSaid, beam: beamSaid, pose: poseSaid,
+  corner: cornerSaid, wall: wallSaid, mapped: mappedSaid, landmark: landmarkSaid, rejection: rejectionSaid, beam: beamSaid, pose: poseSaid,
 };
 
 /** Says beside a pixel what the things there are. */
@@ -44,6 +45,15 @@ function wallSaid({ id, length, n_points: points, rms, covariance }) {
     `${metres(length)} m long, ${wholeNumber(points)} points`,
     `distance ± ${millimetres(Math.sqrt(covariance[1][1]))} mm, direction ± ${fineDegrees(Math.sqrt(covariance[0][0]))}°`,
     `points scatter by ${millimetres(rms)} mm`,
+  ];
+}
+
+function mappedSaid({ id, length, length_variance: variance, ends, covariance, count, first_seen: first }) {
+  return [
+    `Wall W${id} of the map`,
+    `${metres(length)} m ± ${millimetres(Math.sqrt(variance))} mm long, runs at ${degrees(slant({ ends }))}°`,
+    `distance ± ${millimetres(Math.sqrt(covariance[1][1]))} mm, direction ± ${fineDegrees(Math.sqrt(covariance[0][0]))}°`,
+    `seen in ${wholeNumber(count)} keyframes since ${moment(first)}`,
   ];
 }
 

@@ -19,7 +19,7 @@ const FEW = 40; // landmarks that have room for their numbers
 
 /**
  * Draws a world as it is seen by a look. `view` are the settings, `mask` the sectors left out, `selection` the ids
- * chosen, `hovered` what is pointed at, `colours` those of methods and tokens. Returns how many ellipses are not drawn
+ * chosen, `hovered` all that is pointed at, `colours` those of methods and tokens. Returns how many ellipses are not drawn
  * at their size: {grown, shrunk}.
  */
 export function drawMarks(pen, look, world, { view, mask, selection, hovered, colours }) {
@@ -41,10 +41,12 @@ export function drawMarks(pen, look, world, { view, mask, selection, hovered, co
 
 /** The walls of the main method, where no scene shows them. */
 export function drawWalls(pen, look, { frame, walls }, { methods }) {
-  for (const { ends } of walls) {
-    const points = ends.map((end) => look.toScreen(end));
-    if (points.every(Boolean)) pen.path(points, { stroke: methods[frame.methods[0]].colour, width: 2 });
-  }
+  for (const wall of walls) along(pen, look, wall, { stroke: methods[frame.methods[0]].colour, width: 2 });
+}
+
+/** The walls of the map, where no scene shows them. */
+export function drawMapped(pen, look, { mapped }, { wall: stroke }) {
+  for (const wall of mapped.walls) along(pen, look, wall, { stroke, width: 2 });
 }
 
 /** The measured points of a frame that has them, where no scene shows them. */
@@ -123,17 +125,24 @@ function drawSensor(pen, look, { at, heading }, { sensor }) {
 }
 
 /** What is selected, ringed; what is pointed at, ringed thinly. */
-function drawChosen(pen, look, { corners, landmarks, walls }, { selection, hovered, colours }) {
+function drawChosen(pen, look, { corners, landmarks, walls, mapped }, { selection, hovered, colours }) {
   const chosen = [
     ...corners.filter(({ id }) => id === selection.corner),
     ...landmarks.filter(({ id }) => id === selection.landmark),
   ];
   for (const thing of chosen) ring(pen, look, thing, { stroke: colours.ring, width: 3 });
-  if (hovered?.at && !chosen.includes(hovered)) ring(pen, look, hovered, { stroke: colours.text, width: 1.5 });
-  const line = ({ ends }, style) => pen.path(ends.map((end) => look.toScreen(end)).filter(Boolean), style);
-  const wall = walls.find(({ id }) => id === selection.wall);
-  if (wall) line(wall, { stroke: colours.ring, width: 4 });
-  if (hovered?.ends) line(hovered, { stroke: colours.text, width: 4, opacity: 0.6 });
+  const wall = walls.find(({ id }) => id === selection.wall) ?? mapped.walls.find(({ id }) => id === selection.mapped);
+  if (wall) along(pen, look, wall, { stroke: colours.ring, width: 4 });
+  for (const thing of hovered) {
+    if (thing.ends) along(pen, look, thing, { stroke: colours.text, width: 4, opacity: 0.6 });
+    else if (!chosen.includes(thing)) ring(pen, look, thing, { stroke: colours.text, width: 1.5 });
+  }
+}
+
+/** A stroke from one end of a wall to the other. */
+function along(pen, look, { ends }, style) {
+  const points = ends.map((end) => look.toScreen(end));
+  if (points.every(Boolean)) pen.path(points, style);
 }
 
 /** A place that a list tells of: a ring, at the edge with a line from the middle if it lies outside the view. */

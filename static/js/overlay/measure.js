@@ -1,14 +1,17 @@
-// Measuring: two clicks that snap to corners and walls; the server says how far they are from each other, and how sure.
+// Measuring: two clicks that snap to corners and walls, both of the scan or both of the map; the server says how far they
+// are from each other, and how sure.
 
 import { attempt } from "../actions.js";
 import { request } from "../api.js";
 import { $, setText } from "../dom.js";
+import { isMapFirst } from "../mapped.js";
 import { get, set } from "../store.js";
 import { degrees, metres, millimetres } from "../units.js";
 
 const HINT = "Click two corners or walls";
+const MIXED = "Only the scan shows one and only the map the other: click two of the scan, or two of the map";
 
-/** Whether clicks measure; the store has {first, second, found} as "measure", null while they select. */
+/** Whether clicks measure; the store has {clicked, first, second, found} as "measure", null while they select. */
 export const isMeasuring = () => Boolean(get("measure"));
 
 export function toggleMeasure() {
@@ -24,12 +27,18 @@ export function cancelMeasure() {
   return was;
 }
 
-/** Takes what was clicked, {kind, at}; the third click begins anew. Null is a click beside everything. */
-export async function measureFrom(thing) {
-  if (!thing) return say("Nothing to measure there: click a corner or a wall");
-  const { first, second } = get("measure");
-  if (!first || second) set("measure", { first: thing });
-  else await measure(first, thing);
+/** Takes what was clicked, {scan, map} as `measurableAt` says; the third click begins anew. */
+export async function measureFrom(now) {
+  const order = isMapFirst() ? ["map", "scan"] : ["scan", "map"];
+  const shown = order.find((source) => now[source]);
+  if (!shown) return say("Nothing to measure there: click a corner or a wall");
+  const { clicked, second } = get("measure");
+  if (!clicked || second) set("measure", { clicked: now, first: now[shown] });
+  else {
+    const common = order.find((source) => clicked[source] && now[source]);
+    if (!common) return say(MIXED);
+    await measure(clicked[common], now[common]);
+  }
   say();
 }
 

@@ -6,15 +6,16 @@ import { request } from "../api.js";
 import { token } from "../chart.js";
 import { methodColour } from "../colours.js";
 import { $, setText } from "../dom.js";
+import { isMapFirst, selectMapped } from "../mapped.js";
 import { lookNow, plainCamera, view as camera } from "../scene.js";
 import { selectedWall, selectWall } from "../selected-wall.js";
 import { get, on, set } from "../store.js";
 import { fixed } from "../units.js";
 import { lookAround } from "./around.js";
 import { drawGrid, scaleBar } from "./grid.js";
-import { chosenAt, measurableAt, nearestWall, speckAt, thingAt } from "./hits.js";
+import { chosenAt, measurableAt, speckAt, thingsAt, wallsAt } from "./hits.js";
 import { showHover } from "./hover.js";
-import { drawMarks, drawPlace, drawPoints, drawWalls } from "./marks.js";
+import { drawMapped, drawMarks, drawPlace, drawPoints, drawWalls } from "./marks.js";
 import { drawMeasure, isMeasuring, measureFrom, toggleMeasure } from "./measure.js";
 import { CanvasPen, SvgPen } from "./pens.js";
 import { listen } from "./pointer.js";
@@ -24,6 +25,7 @@ import { worldOf } from "./world.js";
 const TOKENS = {
   text: "--text", halo: "--scene", line: "--grid", axis: "--grid-axis", number: "--muted", rejected: "--bad",
   sensor: "--strong", ring: "--selected-mark", landmark: "--landmark", tentative: "--tentative", trail: "--trail",
+  wall: "--wall",
 };
 
 let world = null;
@@ -34,9 +36,10 @@ const heard = new WeakSet(); // documents of the scene's frame
 
 export function mountOverlay() {
   set("around", { beams: [], poses: [] });
-  on(["frame"], (frame) => (world = worldOf(frame, get("landmarks") ?? new Map())));
-  on(["landmarks"], () => get("frame") && (world = worldOf(get("frame"), get("landmarks"))));
-  for (const key of ["frame", "settings", "selection", "wall", "landmarks", "methods", "measure", "place", "around", "tools"]) on([key], redraw);
+  on(["frame"], (frame) => (world = worldOf(frame, get("landmarks") ?? new Map(), get("mapped"))));
+  for (const key of ["landmarks", "mapped"])
+    on([key], () => get("frame") && (world = worldOf(get("frame"), get("landmarks") ?? new Map(), get("mapped"))));
+  for (const key of ["frame", "settings", "selection", "wall", "mappedWall", "mapped", "landmarks", "methods", "measure", "place", "around", "tools"]) on([key], redraw);
   new ResizeObserver(redraw).observe($("stage"));
   $("scene").addEventListener("load", follow);
   follow();
@@ -88,14 +91,15 @@ function draw() {
 /** Draws all there is with a pen, as seen by a look. */
 export function drawOver(pen, look) {
   const { view, sensor } = get("settings");
-  const selection = { ...get("selection"), wall: selectedWall(world.frame)?.id };
-  const hovered = pointed && thingAt(world, view.layers, look, pointed);
+  const selection = { ...get("selection"), wall: selectedWall(world.frame)?.id, mapped: get("mappedWall") };
+  const hovered = pointed ? thingsAt(world, view.layers, look, pointed) : [];
   if (view.layers.grid) drawGrid(pen, look, { ...colours, text: colours.number });
+  if (view.layers.walls && plainCamera()) drawMapped(pen, look, world, colours);
   if (view.layers.segments && plainCamera()) drawWalls(pen, look, world, colours);
   tell(drawMarks(pen, look, world, { view, mask: sensor.mask ?? [], selection, hovered, colours }));
   if (get("place")) drawPlace(pen, look, get("place"), colours);
   drawMeasure(pen, look, colours);
-  showHover([hovered, pointed && speckAt(get("around"), view.layers, look, pointed)].filter(Boolean), pointed);
+  showHover([...hovered, pointed && speckAt(get("around"), view.layers, look, pointed)].filter(Boolean), pointed);
   showScale(look);
 }
 
@@ -115,6 +119,7 @@ export async function saveView(kind) {
   const name = `lidarcore-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}`;
   const put = (pen) => {
     drawPoints(pen, look, scan, colours.number);
+    if (get("settings").view.layers.walls) drawMapped(pen, look, world, colours);
     drawWalls(pen, look, world, colours);
     drawOver(pen, look);
   };
@@ -159,8 +164,10 @@ function click(pixel, within) {
   const { corner, landmark } = chosenAt(world, layers, lookNow(), pixel, within);
   const change = { ...(corner !== undefined && { corner }), ...(landmark !== undefined && { landmark }) };
   if (Object.keys(change).length) return void select(change);
-  const wall = nearestWall(world, layers, lookNow(), pixel, within);
-  if (wall) selectWall(world.frame, wall);
+  const walls = wallsAt(world, layers, lookNow(), pixel, within);
+  const [wall] = isMapFirst() ? walls.reverse() : walls;
+  if (wall?.kind === "mapped") selectMapped(wall.id);
+  else if (wall) selectWall(world.frame, wall);
 }
 
 function hover(pixel) {

@@ -8,8 +8,10 @@ export function placer({ x, y, heading } = { x: 0, y: 0, heading: 0 }) {
   return ([u, v]) => [x + c * u - s * v, y + s * u + c * v];
 }
 
-/** All there is to draw and to point at; `landmarks` are those of the map by their id. */
-export function worldOf(frame, landmarks) {
+const NONE = { walls: [], corners: [] };
+
+/** All there is to draw and to point at; `landmarks` are those of the map by their id, `mapped` its walls and corners. */
+export function worldOf(frame, landmarks, mapped = NONE) {
   const pose = frame.localization?.pose;
   const place = placer(pose);
   const heading = pose?.heading ?? 0;
@@ -23,6 +25,7 @@ export function worldOf(frame, landmarks) {
       .map((rejection) => ({ ...rejection, kind: "rejection", candidate: rejection.kind, at: place(rejection.xy) })),
     landmarks: frame.localization ? [...landmarks.values()].map(landmarkOf) : [],
     tentative: frame.localization?.tentative ?? [],
+    mapped: frame.localization ? mapped : NONE,
   };
 }
 

@@ -1,0 +1,63 @@
+"""Walls of a map as JSON: for answers, and all of them for the stream."""
+
+from collections.abc import Iterable
+
+from pydantic_core import to_json
+from typing_extensions import TypedDict
+
+from lidarcore.mapping.walls import Walls, WallTable
+
+from .schemas import Matrix, Pair
+
+
+class WallJson(TypedDict):
+    """A surface seen from one side: x cos(alpha) + y sin(alpha) = r, rad and m, in the frame of the map.
+
+    `covariance` is of (alpha, r); `ended` is false at an end beyond which the wall may go on, for nobody looked there;
+    `count` keyframes saw it. `id` stays while the map grows and bends, and is not given twice in one map. Walls that
+    become one keep the oldest id; the longest part of a wall that is cut keeps its id.
+    """
+
+    id: int
+    alpha: float
+    r: float
+    covariance: Matrix
+    start: Pair
+    end: Pair
+    length: float
+    length_variance: float
+    ended: tuple[bool, bool]
+    in_corner: tuple[bool, bool]
+    first_seen: float
+    last_seen: float
+    count: int
+
+
+def walls_text(walls: Walls | None) -> str:
+    """The walls of a map, and the corners where two of them meet, with the ids of both; none where there is no map."""
+    if walls is None:
+        return to_json({"walls": [], "corners": []}).decode()
+    corners = zip(walls.corners.xy.tolist(), walls.ids[walls.corners.walls].tolist(), strict=True)
+    met = [{"at": at, "walls": pair} for at, pair in corners]
+    return to_json({"walls": wall_rows(walls, range(len(walls))), "corners": met}).decode()
+
+
+def wall_rows(walls: WallTable, chosen: Iterable[int]) -> list[WallJson]:
+    """An object for each of the walls chosen by their places in the table."""
+    columns = {
+        "id": walls.ids.tolist(),
+        "alpha": walls.alpha.tolist(),
+        "r": walls.r.tolist(),
+        "covariance": walls.line_covariance.tolist(),
+        "start": walls.ends[:, 0].tolist(),
+        "end": walls.ends[:, 1].tolist(),
+        "length": walls.length.tolist(),
+        "length_variance": walls.length_variance.tolist(),
+        "ended": walls.ended.tolist(),
+        "in_corner": walls.in_corner.tolist(),
+        "first_seen": walls.first_seen.tolist(),
+        "last_seen": walls.last_seen.tolist(),
+        "count": walls.count.tolist(),
+    }
+    rows = list(zip(*columns.values(), strict=True))
+    return [WallJson(**dict(zip(columns, rows[i], strict=True))) for i in chosen]  # type: ignore[typeddict-item]

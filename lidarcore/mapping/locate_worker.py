@@ -1,0 +1,170 @@
+"""Where keyframes lie in a known map, in a thread of its own: a scan never waits for a search."""
+
+import logging
+from collections import deque
+from typing import Literal
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.errors import LocalizationError
+from lidarcore.geometry import UncertainPose, compose
+from lidarcore.localization.tracking_result import State
+from lidarcore.mapping.background import END_WITHIN, Corrected, MapPicture
+from lidarcore.mapping.front import Tracked
+from lidarcore.mapping.relocation import Relocation, Relocator, Verdict, query_of
+from lidarcore.mapping.settings import VAGUE
+from lidarcore.mapping.worker import Worker
+from lidarcore.scan import Scan
+
+_log = logging.getLogger(__name__)
+
+_TOGETHER = 6  # keyframes that are looked for together
+_MISSES = 3  # keyframes in a row that the map contradicts, after which the pose is not believed
+_LOST = 1.0  # m of standard deviation beyond which a predicted pose is none
+_NOWHERE = UncertainPose(np.zeros(3), np.diag([10.0, 10.0, np.pi]) ** 2)
+
+_CONFIRMED = 1.0  # m of way after which a pose that was found is believed
+
+_ONCE = "One place of the map fits what is seen; it is believed once it still fits a metre further on."
+_NOT_SEEN = "What is seen does not lie on the map here: the pose is predicted by motion alone."
+_WHY_NOT: dict[Verdict, str] = {
+    "too few points": "Too little is in view to find the pose in the map: drive on, or set the pose.",
+    "no fit": "What is seen fits nowhere in the map: drive on, or set the pose.",
+    "several places": "What is seen fits in several places of the map: drive on, or set the pose.",
+}
+
+
+class LocateWorker:
+    """Takes keyframes and says where they lie; `corrected` is replaced whole, and may be read from any thread.
+
+    A pose is believed once a search of the whole map has one answer, and the map still agrees a metre further on: where
+    rooms look alike and one of them is not in the map, a single view is mistaken for the other. From there on it is
+    carried by the front end, and corrected by the map near where it should be. Both are estimates whose errors depend
+    on each other, as the same walls of the same map are seen again and again: they are joined by covariance
+    intersection, so that the covariance never falls below what the map allows.
+
+    picture     what is known of the building
+    drift       (3, 3) covariance that a step from keyframe to keyframe has beside noise
+    background  whether searches run in a thread of their own; otherwise `put` waits for them
+    """
+
+    mode: Literal["slam", "localize"] = "localize"
+
+    def __init__(self, picture: MapPicture, drift: Array, background: bool) -> None:
+        self.picture, self._drift = picture, drift
+        self.corrected = Corrected(np.zeros((1, 3)), _NOWHERE.covariance)
+        self._relocator: Relocator | None = None
+        self._here, self._local = _NOWHERE, np.zeros(3)  # T_map_keyframe, T_local_keyframe
+        self._poses: list[Array] = []
+        self._recent: deque[tuple[Scan, Array]] = deque(maxlen=_TOGETHER)  # and T_local_keyframe
+        self._verdict: tuple[State, str | None] = "starting", None
+        self._misses = 0
+        self._begin, self._is_confirmed = self._local, False  # where the pose was found
+        self._worker = Worker(self._work, "locate") if background else None
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether keyframes wait."""
+        return self._worker is not None and self._worker.is_behind
+
+    def put(self, tracked: Tracked) -> None:
+        """Go on by a keyframe. Without a thread, raises LocalizationError if nothing can be found in this map."""
+        self._hand_over(tracked)
+
+    def place(self, T_map_keyframe: UncertainPose) -> None:
+        """Go on from a pose of the last keyframe, or of the first one to come, that someone has told."""
+        self._hand_over(T_map_keyframe)
+
+    def _hand_over(self, item: Tracked | UncertainPose) -> None:
+        if self._worker is None:
+            self._step(item, 0)
+        else:
+            self._worker.put(item)
+
+    def judge(self, tracked: Tracked, here: UncertainPose) -> tuple[State, str | None]:
+        """Whether the pose of a scan is to be believed, and what is to be said about that."""
+        if tracked.on or self._verdict[0] != "tracking":
+            return self._verdict
+        return "coasting", _NOT_SEEN
+
+    def end(self) -> None:
+        """Take no more keyframes; returns at once."""
+        if self._worker is not None:
+            self._worker.end()
+
+    def close(self) -> None:
+        """End, and wait for it."""
+        if self._worker is not None:
+            self._worker.close(END_WITHIN)
+
+    def _work(self, item: Tracked | UncertainPose | None, waiting: int) -> None:
+        if item is None:
+            return
+        try:
+            self._step(item, waiting)
+        except LocalizationError as error:  # a map in which nothing can be found
+            self._verdict = "lost", str(error)
+        except Exception:  # one bad keyframe ends nothing
+            _log.exception("a keyframe could not be found in the map")
+
+    def _step(self, item: Tracked | UncertainPose, waiting: int) -> None:
+        if isinstance(item, UncertainPose):
+            self._here, self._misses, self._begin, self._is_confirmed = item, 0, self._local, True
+            self._verdict = "coasting", _NOT_SEEN
+        else:
+            self._go_on(item)
+        if self._recent:
+            self._look(waiting)
+            self._poses[-1] = self._here.pose
+            self.corrected = Corrected(np.array(self._poses), self._here.covariance)
+
+    def _go_on(self, tracked: Tracked) -> None:
+        """To the next keyframe, by the front end alone."""
+        if tracked.first is not None:
+            self._recent[-1] = tracked.first.scan, self._local
+        if self._poses:
+            way = UncertainPose(tracked.tie.pose, tracked.tie.covariance + self._drift)
+            self._here, self._local = self._here.compose(way), compose(self._local, way.pose)
+        if tracked.island:  # it may have been carried anywhere
+            self._lose()
+        self._recent.append((tracked.scan, self._local))
+        self._poses.append(self._here.pose)
+
+    def _look(self, waiting: int) -> None:
+        """Compare the last keyframes with the map: near the pose if there is one, else everywhere."""
+        if self._relocator is None:
+            self._relocator = Relocator(self.picture.grid)
+        scans, poses = zip(*self._recent, strict=True)
+        query = query_of(scans, np.array(poses))
+        state = self._verdict[0]
+        if state in ("tracking", "coasting"):
+            self._follow(self._relocator.find_near(query, self._here), self._relocator)
+        elif not waiting:
+            found = self._relocator.find(query)
+            if found.found:
+                self._here, self._begin = UncertainPose(found.pose, found.covariance), self._local
+                self._verdict, self._misses = ("coasting", _ONCE), 0
+            else:
+                self._verdict = state, _WHY_NOT[found.verdict]
+
+    def _follow(self, near: Relocation, relocator: Relocator) -> None:
+        if near.found:
+            self._here, self._misses = self._here.intersect(UncertainPose(near.pose, near.covariance)), 0
+            is_far = np.hypot(*(self._local - self._begin)[:2]) >= _CONFIRMED
+            self._is_confirmed |= is_far
+            self._verdict = ("tracking", None) if self._is_confirmed else ("coasting", _ONCE)
+            return
+        self._verdict = "coasting", _NOT_SEEN
+        self._misses += near.against > relocator.settings.against
+        spread = np.sqrt(np.linalg.eigvalsh(self._here.covariance[:2, :2])[-1])
+        if self._misses >= _MISSES or spread > _LOST or self._here.covariance[2, 2] > VAGUE**2:
+            self._lose()
+
+    def _lose(self) -> None:
+        """What was seen before the sensor was lost does not help to find it."""
+        if self._verdict[0] != "starting":
+            self._verdict = "lost", _WHY_NOT["no fit"]
+            self._here = UncertainPose(self._here.pose, _NOWHERE.covariance)
+        self._recent.clear()
+        self._is_confirmed = False

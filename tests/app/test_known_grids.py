@@ -1,0 +1,175 @@
+"""Localizing in a grid on a real server: an own map, one of ROS, one of `lidarcore map`; and files that are none."""
+
+import csv
+import io
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
+
+import httpx
+import numpy as np
+import pytest
+from processes import Serving, assert_refused, run
+from serving import Server, assert_problem, wait_until
+
+from lidarcore import Scan
+from lidarcore.geometry import compose
+from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, write_ros_map
+from lidarcore.recordings.writer import RecordingWriter
+from lidarcore.scan import Array
+from lidarcore.simulation.robot import SimulatedRobot
+from lidarcore.simulation.settings import SimulationSettings
+
+FRAME = np.array([20.0, -5.0, 2.5])
+"""T_map_world: maps have frames of their own."""
+ROBOT = {"kind": "simulation", "settings": {"world": "furnished room", "seed": 4}}
+LOCALIZE = {"navigation": {"mode": "localize"}}
+YAML = (
+    "image: {}\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+)
+
+
+@pytest.fixture(scope="module")
+def scans() -> list[Scan]:
+    return list(islice(SimulatedRobot(SimulationSettings(world="furnished room", seed=9), begin=1e9), 200))
+
+
+def poses(scans: list[Scan]) -> Array:
+    return np.array([compose(FRAME, scan.truth) for scan in scans if scan.truth is not None])
+
+
+@pytest.fixture(scope="module")
+def grid(scans: list[Scan]) -> OccupancyGrid:
+    later = list(
+        islice(SimulatedRobot(SimulationSettings(world="furnished room", seed=9), begin=1e9), 0, 400, 10)
+    )
+    return build_grid(later, poses(later))
+
+
+@pytest.fixture(scope="module")
+def ros_map(grid: OccupancyGrid, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("ros") / "hall.yaml"
+    write_ros_map(grid, path)
+    return path
+
+
+def packed(*files: tuple[str, bytes]) -> bytes:
+    found = io.BytesIO()
+    with ZipFile(found, "w", ZIP_DEFLATED) as archive:
+        for name, content in files:
+            archive.writestr(name, content)
+    return found.getvalue()
+
+
+@pytest.fixture
+def driving(tmp_path: Path, background: Path) -> Iterator[Server]:
+    server = Server(tmp_path / "recordings", recording=background)
+    server.change("PUT", "/source", ROBOT)
+    yield server
+    server.stop()
+
+
+def tracked(http: httpx.Client) -> bool:
+    answer = http.get("/pose")
+    return bool(answer.is_success and answer.json()["state"] == "tracking")
+
+
+def test_a_map_of_ros_is_loaded_and_localized_in(driving: Server, grid: OccupancyGrid, ros_map: Path) -> None:
+    image = ros_map.with_suffix(".pgm")
+    body = packed(("maps/hall.yaml", ros_map.read_bytes()), ("maps/hall.pgm", image.read_bytes()))
+    answer = driving.http.post("/map", params={"format": "zip", "name": "hall.yaml"}, content=body)
+    session = answer.json()
+    assert (answer.status_code, session["source"], session["grid"], session["landmarks"]) == (
+        201, "hall.yaml", True, 0,
+    )  # fmt: skip
+    driving.change("PUT", "/localization/map", {"session": session["id"]})
+    driving.change("PATCH", "/settings", LOCALIZE)
+    wait_until(lambda: tracked(driving.http), "it is tracked")
+    status = driving.get("/localization")
+    assert (status["mode"], status["method"], status["session"]) == ("localize", "scans", session["id"])
+    pose = driving.get("/pose")
+    truth = driving.get("/frame")["localization"]["truth"]
+    assert pose["mode"] == "localize"
+    assert np.hypot(pose["x"] - truth[0], pose["y"] - truth[1]) > 10  # the map's frame is not the robot's
+    back = driving.http.get("/map", params={"session": session["id"], "format": "zip"})
+    with ZipFile(io.BytesIO(back.content)) as archive:
+        assert sorted(archive.namelist()) == ["map.pgm", "map.yaml"]
+        archive.extractall(ros_map.parent / "back")
+    again = read_ros_map(ros_map.parent / "back" / "map.yaml")
+    np.testing.assert_array_equal(again.cells, read_ros_map(ros_map).cells)
+    np.testing.assert_allclose(again.origin, grid.origin)
+    # And to be told where it is: at a wrong place it is not tracked.
+    driving.change("POST", "/pose", {"x": pose["x"], "y": pose["y"], "heading": pose["heading"]})
+    assert_problem(driving.http.post("/pose", json={"x": 0, "y": 0, "heading": 0, "sigma_position": 0}), 422)
+
+
+@pytest.mark.parametrize(
+    ("files", "text"),
+    [
+        ([("a.yaml", b"image: ../secret.pgm\n" + YAML.partition("\n")[2].encode()), ("a.pgm", b"P5")], "outside"),
+        ([("a.yaml", YAML.format("a.pgm").encode())], "a.pgm"),
+        ([("a.yaml", YAML.format("a.pgm").encode()), ("a.pgm", b"P5\n9 9\n255\nshort")], "says 9 x 9"),
+        ([("a.yaml", b"x: 1"), ("b.yaml", b"x: 2")], "2 YAML files"),
+        ([("plan.svg", b"<svg/>")], "0 YAML files"),
+        ([("a.yaml", YAML.format("a.pgm").encode()), ("a.pgm", bytes(300_000_000))], "bytes"),
+        ([(f"{k}.pgm", b"") for k in range(30)] + [("a.yaml", b"x: 1")], "files"),
+    ],
+)  # fmt: skip
+def test_a_zip_that_holds_no_map_is_refused_and_leaves_nothing(
+    shared_server: Server, files: list[tuple[str, bytes]], text: str
+) -> None:
+    before = shared_server.get("/sessions")["sessions"]
+    answer = shared_server.http.post("/map", params={"format": "zip"}, content=packed(*files))
+    assert text in assert_problem(answer, 422)["detail"]
+    assert shared_server.get("/sessions")["sessions"] == before
+
+
+def test_bytes_that_are_no_zip_are_refused(shared_server: Server) -> None:
+    answer = shared_server.http.post("/map", params={"format": "zip"}, content=b"no zip")
+    assert "no zip" in assert_problem(answer, 422)["detail"]
+
+
+@pytest.mark.long
+def test_a_map_that_was_built_is_localized_in_after_the_server_was_killed(
+    serving: Callable[..., Serving], tmp_path: Path, background: Path
+) -> None:
+    path = tmp_path / "maps.db"
+    server = serving(background, "--map", path)
+    with httpx.Client(base_url=f"{server.url}api/v1", timeout=60) as http:
+        http.put("/source", json=ROBOT).raise_for_status()
+        http.patch("/settings", json={"navigation": {"mode": "slam", "method": "scans"}}).raise_for_status()
+        kept = lambda: [one for one in http.get("/sessions").json()["sessions"] if one["grid"]]  # noqa: E731
+        wait_until(lambda: len(kept()) == 1, seconds=120)
+        wait_until(lambda: http.get("/localization").json()["method"] == "scans")
+    server.process.kill()
+    server.process.wait()
+    again = serving(background, "--map", path)
+    with httpx.Client(base_url=f"{again.url}api/v1", timeout=60) as http:
+        http.put("/source", json=ROBOT).raise_for_status()
+        http.patch("/settings", json=LOCALIZE).raise_for_status()
+        wait_until(lambda: tracked(http), seconds=120)
+        assert http.get("/localization").json()["session"] == 1
+
+
+def test_a_recording_is_localized_in_a_map_of_ros_by_the_command(
+    scans: list[Scan], ros_map: Path, tmp_path: Path
+) -> None:
+    recording, found = tmp_path / "driven.mcap", tmp_path / "poses.csv"
+    with RecordingWriter(recording) as writer:
+        for scan in scans[:120]:
+            writer.write(scan)
+    done = run("localize", recording, "--map", ros_map, "-o", found)
+    assert done.returncode == 0, done.stderr
+    assert "120 scans" in done.stdout
+    with found.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    states = [row["state"] for row in rows]
+    assert states[-1] == "tracking"
+    last = np.array([float(rows[-1][name]) for name in ("x", "y", "heading")])
+    assert np.hypot(*(last - poses(scans[:120])[-1])[:2]) < 0.1
+    missing = run("localize", recording, "--map", tmp_path / "none.yaml")
+    assert_refused(missing, "none.yaml")
+    empty = tmp_path / "empty.yaml"
+    write_ros_map(OccupancyGrid(np.zeros((5, 5)), 0.05, np.zeros(3)), empty)
+    assert_refused(run("localize", recording, "--map", empty), "Nothing is occupied")
