@@ -81,3 +81,20 @@ def test_a_map_is_built(newcomer: Visitor) -> None:
 def test_the_strip_is_closed(newcomer: Visitor) -> None:
     newcomer.page.get_by_role("button", name="Close the first steps").click()
     closed(newcomer)
+
+
+def test_on_a_phone_it_leaves_four_fifths_of_the_view_and_its_buttons_are_easy_to_tap(
+    visit: Callable[..., Visitor],
+) -> None:
+    page = visit(390, 844, first_visit=True).open().page
+    strip = page.get_by_role("complementary", name="First steps")
+    expect(strip).to_contain_text("An emulated lidar")  # read aloud, as there is no room to show it
+    covered, view = strip.bounding_box(), page.locator("#stage").bounding_box()
+    assert covered["height"] <= view["height"] / 5
+    buttons = [button.bounding_box() for button in strip.get_by_role("button").all()]
+    assert len(buttons) == 4
+    for box in buttons:
+        assert min(box["width"], box["height"]) >= 44
+        assert covered["x"] <= box["x"]
+        assert box["x"] + box["width"] <= covered["x"] + covered["width"] <= 390
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390

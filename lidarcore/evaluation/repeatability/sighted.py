@@ -130,9 +130,8 @@ def _medians(values: Array) -> Array:
     """Over the first axis, without NaN; NaN where there is nothing else."""
     ordered = np.sort(values, axis=0)  # NaN last
     n = np.isfinite(values).sum(0)
-    padded = np.concatenate([ordered, np.full((1, *values.shape[1:]), np.nan)])
-    low, high = (np.take_along_axis(padded, k[None], 0)[0] for k in (np.maximum(n - 1, 0) // 2, n // 2))
-    medians: Array = (low + high) / 2
+    padded, rest = np.concatenate([ordered, np.full((1, *n.shape), np.nan)]), tuple(np.indices(n.shape))
+    medians: Array = (padded[np.maximum(n - 1, 0) // 2, *rest] + padded[n // 2, *rest]) / 2
     return medians
 
 
