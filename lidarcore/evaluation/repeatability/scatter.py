@@ -27,9 +27,9 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
-    """R sightings of features, all corners or all walls, sorted by feature and then by scan.
+    """R sightings of features, all corners or all walls; for `scatter` sorted by feature and then by scan.
 
-    ids, scans (R,); table (R, M, SIGHTING) for M methods, NaN where a method did not find the feature.
+    ids, scans (R,); table (R, M, SIGHTING) for M methods, NaN where a method did not find the feature; (R, 2) of one.
     """
 
     ids: Ints
@@ -40,6 +40,18 @@ class Observations:
     def starts(self) -> Ints:
         """(K,) where each feature begins."""
         return np.flatnonzero(np.diff(self.ids, prepend=-1))
+
+    def without(self, n: int) -> "Observations":
+        """All but the first n sightings."""
+        return Observations(self.ids[n:], self.scans[n:], self.table[n:])
+
+    def followed_by(self, other: "Observations") -> "Observations":
+        """These, then others."""
+        return Observations(
+            np.concatenate([self.ids, other.ids]),
+            np.concatenate([self.scans, other.scans]),
+            np.concatenate([self.table, other.table]),
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,12 +3,12 @@
 from bisect import bisect_left, bisect_right
 from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.repeatability.scatter import (
@@ -24,15 +24,10 @@ from lidarcore.evaluation.repeatability.wall_tracker import WallRow
 from lidarcore.tracking import CornerRow
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Record:
-    """One scan: ids (K,); table (K, M, SIGHTING), NaN where not found; places (K, 2), the coordinates by the first
-    method that has them; areas (M, 2), medians over the features.
-    """
+class _Record(NamedTuple):
+    """One scan: table (K, M, SIGHTING), NaN where not found; areas (M, 2), medians over the features."""
 
-    ids: Ints
     table: Array
-    places: Array
     areas: Array
 
 
@@ -42,6 +37,8 @@ class Sighted:
     def __init__(self, window: int, methods: tuple[str, ...], noun: str) -> None:
         self.methods, self.noun = methods, noun
         self._records = deque[_Record](maxlen=window)
+        self._added = 0
+        self.clear()
 
     def __len__(self) -> int:
         """Scans in the window."""
@@ -50,28 +47,31 @@ class Sighted:
     def clear(self) -> None:
         """Forget every scan."""
         self._records.clear()
+        self._firsts = Observations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2)))
 
     def add(self, rows: Sequence[CornerRow | WallRow], table: Array) -> None:
         """One more scan: its features, and what each method saw of them (K, M, SIGHTING), NaN where nothing."""
-        ids, first = np.array([row.id for row in rows], np.int64), np.isfinite(table[..., 0]).argmax(1)
-        places = table[np.arange(len(table)), first, :2]
-        self._records.append(_Record(ids, table, places, _medians(one_sigma_areas(table))))
+        k, first = np.arange(len(table)), np.isfinite(table[..., 0]).argmax(1)
+        ids = np.array([row.id for row in rows], np.int64)
+        new = Observations(ids, np.full(len(ids), self._added), table[k, first, :2])
+        oldest = len(self._records[0].table) if len(self) == self._records.maxlen else 0
+        self._firsts = self._firsts.without(oldest).followed_by(new)
+        self._records.append(_Record(table, _medians(one_sigma_areas(table))))
+        self._added += 1
 
     def sightings(self) -> Observations:
         """All of the window, sorted by feature."""
-        return self._sorted(
-            [record.table for record in self._records] or [np.empty((0, len(self.methods), SIGHTING))]
-        )
+        nothing = np.empty((0, len(self.methods), SIGHTING))
+        return self._sorted(np.concatenate([nothing, *(record.table for record in self._records)]))
 
     def firsts(self) -> Observations:
         """The two coordinates (R, 2) of each sighting by the first method that has it, sorted by feature."""
-        return self._sorted([record.places for record in self._records] or [np.empty((0, 2))])
+        return self._sorted(self._firsts.table)
 
-    def _sorted(self, tables: Sequence[Array]) -> Observations:
-        ids = np.concatenate([np.empty(0, np.int64), *(record.ids for record in self._records)])
-        scans = np.repeat(np.arange(len(self)), [len(record.ids) for record in self._records])
-        order = np.argsort(ids, kind="stable")
-        return Observations(ids[order], scans[order], np.concatenate(tables)[order])
+    def _sorted(self, table: Array) -> Observations:
+        order = np.argsort(self._firsts.ids, kind="stable")
+        scans = self._firsts.scans[order] - (self._added - len(self))
+        return Observations(self._firsts.ids[order], scans, table[order])
 
     def scatter(self) -> Scatter:
         """The figures of the window."""
