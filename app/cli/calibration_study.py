@@ -23,12 +23,15 @@ def calibration(
         str | None,
         typer.Option(
             metavar="RANGE,BEARING,GROWTH",
-            help="of the sensor, in m, rad and 1/m; 0.002,0.001,0.0003 if not given",
+            help="noise of the sensor in m, rad and 1/m; 0.002,0.001,0.0003 if not given",
         ),
     ] = None,
-    scans: Annotated[int, typer.Option(min=10, help="of a calibration")] = 60,
+    scans: Annotated[int, typer.Option(min=10, help="scans of a calibration")] = 60,
     fewer: Annotated[
-        int, typer.Option(min=10, help="of another one, whose errors are printed, too; at most as many")
+        int,
+        typer.Option(
+            min=10, help="scans of a second calibration, at most --scans; its errors are printed, too"
+        ),
     ] = 40,
     seed: Seed = 0,
     workers: Workers = None,

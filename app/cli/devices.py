@@ -19,7 +19,7 @@ def devices(
     ask: Annotated[
         bool, typer.Option(help="ask what looks like an RPLIDAR; stops one that was left turning")
     ] = True,
-    as_json: Annotated[bool, typer.Option("--json", help="for programs")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print JSON, for programs")] = False,
 ) -> None:
     """List the serial ports, and say which are RPLIDARs."""
     from lidarcore.rplidar import find_devices

@@ -43,9 +43,14 @@ Rooms = Annotated[
 ]
 Noises = Annotated[
     list[str] | None,
-    typer.Option(metavar="RANGE,BEARING", help="sigmas in m and rad, e.g. 0.02,0.0034; may be repeated"),
+    typer.Option(
+        metavar="RANGE,BEARING",
+        help="noise of the sensor: sigmas in m and rad, e.g. 0.02,0.0034; may be repeated",
+    ),
 ]
-Segments = Annotated[str, typer.Option(help="known, found (by the real segmentation), or both")]
+Segments = Annotated[
+    str, typer.Option(help="which segments: known, found (by the real segmentation), or both")
+]
 Trials = Annotated[
     int,
     typer.Option(
@@ -87,7 +92,7 @@ def consistency(
         consistency_tables.check(output, consistency_tables.STUDY_FORMATS)
         check_folder(output)
     if segments not in (*SEGMENTATIONS, "both"):
-        raise typer.BadParameter("--segments is known, found or both.")
+        raise typer.BadParameter(f"--segments {segments} is unknown: give known, found or both.")
     usual = monte_carlo.Design()
     design = monte_carlo.Design(
         rooms=tuple(room or usual.rooms),
@@ -132,7 +137,7 @@ def _console() -> "Console":
 @evaluate.command()
 def repeatability(
     recording: RecordingPath,
-    scans: Annotated[int, typer.Option(min=10, help="in the window; as many are read")] = 100,
+    scans: Annotated[int, typer.Option(min=10, help="scans to read and judge together")] = 100,
     skip: Annotated[int, typer.Option(min=0, help="scans to leave out at the beginning")] = 0,
     methods: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="fitters to compare; all if not given")

@@ -23,8 +23,10 @@ def evaluate_map(
             help="recorded, poor (3 % scale, 1 % a metre turn bias, noise), none; auto is what the recording allows"
         ),
     ] = "auto",
-    seed: Annotated[int, typer.Option(min=0, help="of the poor odometry")] = 0,
-    seeds: Annotated[int, typer.Option(min=1, help="as many runs with poor odometry, from the seed on")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the errors of poor odometry")] = 0,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="runs with poor odometry, each with a seed of its own, from --seed on")
+    ] = 1,
     relations: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="relations between scans verified by hand: t1 t2 dx dy dz r p yaw"),

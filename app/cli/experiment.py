@@ -40,9 +40,14 @@ Scans = Annotated[
 ]
 SigmaRange = Annotated[
     float | None,
-    typer.Option(help="m, the methods are told; the papers' 0.05 if not given: calibrate a real sensor"),
+    typer.Option(
+        help="range noise in m that the methods assume; the papers' 0.05 if not given; for a real sensor, calibrate it"
+    ),
 ]
-SigmaBearing = Annotated[float | None, typer.Option(help="rad, likewise; 0.0035 (0.2°) if not given")]
+SigmaBearing = Annotated[
+    float | None,
+    typer.Option(help="bearing noise in rad that the methods assume; 0.0035 (0.2°) if not given"),
+]
 
 
 @experiment.command()

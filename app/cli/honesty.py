@@ -24,7 +24,7 @@ def honesty(
         list[str] | None, typer.Option(help="a simulated world; may be repeated; all if not given")
     ] = None,
     runs: Annotated[int, typer.Option(min=1, max=10_000, help="drives through each world")] = 100,
-    seconds: Annotated[float, typer.Option(min=2, max=3600, help="that each of them lasts")] = 40.0,
+    seconds: Annotated[float, typer.Option(min=2, max=3600, help="length of each drive, in s")] = 40.0,
     seed: Seed = 0,
     workers: Workers = None,
     output: Annotated[

@@ -10,7 +10,10 @@ from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings
 
 def map_recording(
     recording: RecordingPath,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FOLDER", help="for what the map gives")],
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", metavar="FOLDER", help="folder to write the files of the map into"),
+    ],
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,

@@ -49,9 +49,11 @@ def _show(name: str, attempts: "Attempts") -> None:
 def walls(
     recording: Annotated[
         Path | None,
-        typer.Argument(help="with reference poses; without, simulated rooms whose truth is known"),
+        typer.Argument(
+            help="a recording with reference poses; simulated rooms, whose truth is known, if not given"
+        ),
     ] = None,
-    seeds: Annotated[int, typer.Option(min=1, max=1000, help="for every simulated room")] = 10,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="drives through every simulated room")] = 10,
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,

@@ -43,7 +43,7 @@ def check_folder(file: Path, option: str = "--output") -> None:
     """Told before minutes of work are lost. Raises FileNotFoundError unless there can be a file of that name."""
     if file.is_dir() or not file.absolute().parent.is_dir():
         raise FileNotFoundError(
-            errno.ENOENT, f"is no file in a folder that exists, give one for {option}", str(file)
+            errno.ENOENT, f"is not a file in a folder that exists; give one for {option}", str(file)
         )
 
 
@@ -87,7 +87,7 @@ def _read_settings(file: Path) -> dict[str, Any]:
             f"There is no file {file}, and no sensor of that name; known are {sensors}."
         ) from error
     except ValueError as error:  # not text, or not JSON
-        raise LidarError(f"{file} is no JSON file: {error}.") from error
+        raise LidarError(f"{file} is not a JSON file: {error}.") from error
     if not isinstance(settings, dict):
         raise LidarError(f"{file} should hold an object, as GET /api/v1/settings gives it.")
     return settings

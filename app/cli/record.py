@@ -23,11 +23,18 @@ ENOUGH = 0.9  # share of the duration asked for that counts as all of it
 def record(
     output: Annotated[Path, typer.Argument(help="FILE.mcap, which must not exist yet")],
     port: Annotated[str | None, typer.Option(help="serial port; the connected RPLIDAR if not given")] = None,
-    baud: Annotated[int, typer.Option(min=1, help="256000 for an S1")] = 256000,
-    mode: Annotated[str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers")] = None,
+    baud: Annotated[
+        int, typer.Option(min=1, help="baud rate of the sensor; that of an S1 is 256000")
+    ] = 256000,
+    mode: Annotated[
+        str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")
+    ] = None,
     rpm: Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")] = None,
     emulator: Annotated[bool, typer.Option("--emulator", help="record an emulated RPLIDAR S1")] = False,
-    duration: Annotated[float | None, typer.Option(min=0.1, help="s from the first scan on")] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="how long, in s from the first scan on; until Ctrl-C if not given"),
+    ] = None,
     raw: Annotated[Path | None, typer.Option(help="a file for the bytes of the port, too")] = None,
     settings: SettingsFile = None,
     set_: Set = None,
@@ -36,7 +43,7 @@ def record(
     if emulator and port is not None:
         raise typer.BadParameter("give --port or --emulator, not both.")
     if duration is not None and not duration <= LONGEST:
-        raise typer.BadParameter(f"--duration is at most {LONGEST:g} s; without, it is until Ctrl-C.")
+        raise typer.BadParameter(f"--duration is at most {LONGEST:g} s: leave it out to record until Ctrl-C.")
     from lidarcore import warm_up
     from lidarcore.rplidar import Driver, EmulatorProcess, check_wishes
 

@@ -20,15 +20,19 @@ SerialPort = Annotated[
         help="serial port of the sensor, such as /dev/ttyUSB0; a mere number is taken as --http-port"
     ),
 ]
-Baud = Annotated[int | None, typer.Option(min=1200, help="of the sensor; 256000 if not given")]
-Mode = Annotated[str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers")]
+Baud = Annotated[int | None, typer.Option(min=1200, help="baud rate of the sensor; 256000 if not given")]
+Mode = Annotated[
+    str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")
+]
 Rpm = Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")]
 Emulator = Annotated[bool, typer.Option("--emulator", help="an emulated sensor, whatever is connected")]
 Recordings = Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")]
 MapFile = Annotated[
     str | None,
     typer.Option(
-        "--map", metavar="URL", help="file of landmark maps; landmarks.db beside the folder of recordings"
+        "--map",
+        metavar="URL",
+        help="file of landmark maps; landmarks.db beside the folder of recordings if not given",
     ),
 ]
 MaxUpload = Annotated[int, typer.Option(min=1, help="largest upload, MB")]
@@ -89,5 +93,5 @@ def serve(
 def _plain(token: str | None) -> str | None:
     """The token, if it can stand in an address, a header and a cookie as it is; none if it is empty."""
     if token and not re.fullmatch(r"[A-Za-z0-9._~-]+", token):
-        raise typer.BadParameter("a token has letters, digits and - . _ ~ only.")
+        raise typer.BadParameter("a token may hold only letters, digits and - . _ ~: choose another one.")
     return token or None

@@ -59,7 +59,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
                 )
             return [Path(archive.extract(part, folder)) for part in (*parts, *yamls)][-1]
     except (BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
-        raise MapFileError(f"This is no zip that can be read: {error}.") from error
+        raise MapFileError(f"This zip cannot be read: {error}.") from error
 
 
 def _read(path: Path, format: str) -> Iterator[list[Landmark]]:

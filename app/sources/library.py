@@ -178,7 +178,7 @@ class Library:
 
     def _check_unused(self, path: Path) -> None:
         if path.resolve() in {used.resolve() for used in self.in_use()}:
-            raise ConflictError(f"{path.name!r} is being written: end that first.")
+            raise ConflictError(f"{path.name!r} is being written: stop that first.")
 
     def _is_given(self, name: str) -> bool:
         return self.given is not None and self.given.name == name
@@ -201,7 +201,7 @@ def checked_name(name: str) -> str:
     """The name, if it is a plain file name. Raises InvalidNameError otherwise."""
     if not PLAIN_NAME.fullmatch(name) or len(name.encode()) > 200:
         raise InvalidNameError(
-            f"{name!r} is not a plain file name: no slashes, no leading dot, at most 200 bytes."
+            f"{name!r} is not a plain file name: use no slashes, no leading dot and at most 200 bytes."
         )
     return name
 

@@ -39,7 +39,7 @@ class Trash:
         with self._lock:
             if path.name not in self._kept:
                 raise NotFoundError(
-                    f"{path.name!r} cannot be taken back: deleted files are kept for {self.undo_within:g} s."
+                    f"{path.name!r} cannot be restored: deleted files are kept for only {self.undo_within:g} s."
                 )
             kept = self._kept.pop(path.name)
             self._timers.pop(kept).cancel()

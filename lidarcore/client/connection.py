@@ -34,7 +34,9 @@ class Connection:
         try:
             text = json.dumps(body, allow_nan=False)
         except (TypeError, ValueError) as error:
-            raise ClientError(422, "Unprocessable Content", f"{body} is no JSON: {error}.") from error
+            raise ClientError(
+                422, "Unprocessable Content", f"{body} cannot be sent as JSON: {error}."
+            ) from error
         response = self.ask(method, path, content=text, headers={"Content-Type": "application/json"})
         return response.json() if response.content else None
 

@@ -197,7 +197,7 @@ class Database:
         (application,) = connection.execute("PRAGMA application_id").fetchone()
         (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
         if application != _APPLICATION and (application, version, tables) != (0, 0, 0):
-            raise LandmarkMapError(f"{self.path} is a database, but no map of landmarks: give another path.")
+            raise LandmarkMapError(f"{self.path} is a database, but not a landmark map: give another path.")
         if version > len(_MIGRATIONS):
             raise LandmarkMapError(
                 f"{self.path} has version {version}, this program knows up to {len(_MIGRATIONS)}: update lidarcore."

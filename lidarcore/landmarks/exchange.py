@@ -106,7 +106,9 @@ def _read_csv(file: TextIO) -> Iterator[Row]:
 def _lines(file: TextIO) -> Iterator[str]:
     while line := file.readline(MAX_LINE):
         if len(line) == MAX_LINE:
-            raise MapFileError(f"A line is longer than {MAX_LINE} characters: this is no table of landmarks.")
+            raise MapFileError(
+                f"A line is longer than {MAX_LINE} characters: this is not a table of landmarks."
+            )
         yield line
 
 

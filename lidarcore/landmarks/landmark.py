@@ -82,10 +82,12 @@ class Landmark:
             raise LandmarkError(f"The position ({self.x:g}, {self.y:g}) is too far away: give metres.")
         check_covariance(self.var_x, self.cov_xy, self.var_y)
         if max(abs(self.first_seen), abs(self.last_seen)) > MAX_TIME:
-            raise LandmarkError(f"Seen {self.first_seen:g} to {self.last_seen:g} s is no time: give seconds.")
+            raise LandmarkError(
+                f"Seen {self.first_seen:g} to {self.last_seen:g} s is not a time: give seconds."
+            )
         if self.first_seen > self.last_seen:
             raise LandmarkError(
-                f"first_seen {self.first_seen} s is after last_seen {self.last_seen} s: exchange them."
+                f"first_seen {self.first_seen} s is after last_seen {self.last_seen} s: swap them."
             )
         if self.count < 1:
             raise LandmarkError(f"count is {self.count}: a landmark was seen at least once.")

@@ -85,7 +85,7 @@ def read_stream(file: IO[bytes]) -> Stream:
         if about.pop("rplidar_capture") == 1:
             return Stream(**about)
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise RecordingError(f"This is no capture of version 1: it begins with {line[:40]!r}.") from error
+        raise RecordingError(f"This is not a capture of version 1: it begins with {line[:40]!r}.") from error
     raise RecordingError(f"This capture is of another version than 1: it begins with {line[:40]!r}.")
 
 

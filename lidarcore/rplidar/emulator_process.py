@@ -66,7 +66,7 @@ class EmulatorProcess:
                 self._process.stdin.write(line + "\n")
                 self._process.stdin.flush()
             except (OSError, ValueError):  # gone, or closed
-                raise DeviceError(f"The emulator is not running any more, it cannot {line}.") from None
+                raise DeviceError(f"The emulator is no longer running, and so cannot {line}.") from None
             answer = self._next_line(_ANSWER_TIME)
         if not answer.startswith("ok"):
             raise DeviceError(f"The emulator cannot {line}: {answer.removeprefix('error: ')}.")

@@ -10,14 +10,14 @@ const QUESTIONS = [
   {
     key: "area_ratio",
     label: "area / scatter",
-    title: "Area of the ellipses claimed over that of the scatter: 1 if they are true",
+    title: "Area of the claimed ellipses over that of the scatter: 1 if they are true",
     text: (value) => fixed(value, 2),
     off: (value) => Math.abs(Math.log(value)),
   },
   {
     key: "coverage_95",
     label: "in 95\u2009%",
-    title: "How much of the scatter the ellipses of 95 % hold: 95 % if they are true",
+    title: "How much of the scatter the 95 % ellipses hold: 95 % if they are true",
     text: (value) => `${fixed(100 * value, 0)}\u2009%`,
     off: (value) => Math.abs(value - 0.95),
   },

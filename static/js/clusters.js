@@ -10,8 +10,8 @@ const OF_ALL = ["min_points", "max_range"]; // parameters that every method has
 
 const LABELS = {
   min_points: "Fewest points",
-  k: "Number, k",
-  k_max: "Most, k max",
+  k: "Clusters, k",
+  k_max: "Most clusters",
   eps: "Eps",
   max_range: "Max range",
 };

@@ -14,7 +14,7 @@ const READOUTS = [
   {
     key: "frame",
     label: "Scans",
-    hint: "Scans processed since the server started: where it stands still, nothing comes",
+    hint: "Scans processed since the server started. While the number stands still, no scan arrives",
     text: ({ frame }) => frame.sequence,
   },
   {
@@ -103,7 +103,7 @@ function noiseRemark() {
     $("calibration")?.scrollIntoView({ block: "start" });
   };
   const text = el("button", { type: "button", id: "noise-remark", class: "state", onclick });
-  const title = "The ellipses follow from the noise that is set, so they are wrong if it is";
+  const title = "The ellipses are computed from this noise: if it is wrong, so are they";
   return el(
     "div",
     { class: "readout noise-readout", title, hidden: true },

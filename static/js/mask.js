@@ -15,7 +15,7 @@ const NUMBERS = [
   { key: "reach", label: "Reach, m", scale: 1, digits: 3, min: 0.01, max: 10 },
 ];
 const ABOUT =
-  "Where the sensor sees the robot that carries it, what is nearer than the reach is left out before everything else. Angles grow to the left of ahead. For a suggestion, let the robot drive and turn for some seconds.";
+  "In these sectors the sensor sees the robot that carries it: whatever is nearer than the reach is left out before anything else is computed. 0° is straight ahead, and angles grow to the left. For a suggestion, let the robot drive and turn for some seconds.";
 
 const list = el("div", { id: "mask-sectors" });
 const button = (text, onclick) => el("button", { type: "button", class: "button", onclick }, text);

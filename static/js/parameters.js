@@ -15,7 +15,7 @@ const NOISE_LABELS = {
   sigma_bearing: "Bearing",
   range_growth: "Growth with range",
   unevenness: "Unevenness",
-  unevenness_length: "Its length",
+  unevenness_length: "Unevenness length",
   systematic: "Systematic",
 };
 

@@ -6,7 +6,7 @@ import { onSceneMessage, view } from "./scene.js";
 import { attempt } from "./actions.js";
 import { get, on } from "./store.js";
 
-const HINT = "Press where the sensor is and drag to where it looks";
+const HINT = "Press where the sensor is, and drag in the direction it faces";
 const DEGREE = Math.PI / 180;
 
 const NUMBERS = [

@@ -139,7 +139,7 @@ async function removeRecording(name) {
   await refreshRecordings();
   if (!isGone) return;
   const restore = async () => {
-    await attempt(() => request("POST", `${pathOf(name)}/restore`), "The recording could not be taken back");
+    await attempt(() => request("POST", `${pathOf(name)}/restore`), "The recording could not be restored");
     await refreshRecordings();
   };
   toast(name, {

@@ -63,7 +63,7 @@ function make(fields) {
       title("areas-title", "Claimed ellipse areas, mm²"),
       legend({ box: true, last: sign("actual", "area of the scatter") }),
       boxPlot(),
-      el("p", { class: "muted" }, "1σ; each scan's median over its corners. A box left of the line claims more than is so, one to its right less. Where a few corners are disturbed, the table decides: line and boxes are medians of different things."),
+      el("p", { class: "muted" }, "1σ; each scan's median over its corners. A box to the left of the line claims to know more than is true, one to its right less. Where a few corners are disturbed, the table decides: line and boxes are medians of different things."),
     ),
     el(
       "section",
@@ -80,7 +80,7 @@ function make(fields) {
       title("walls-title", "Walls: claim and scatter"),
       el("p", { id: "repeatability-walls-verdict" }),
       el("div", { class: "table-scroll", tabIndex: -1 }, claimTable("repeatability-walls-table")),
-      el("p", { class: "muted" }, "The same of a wall's direction and distance. Many rooms show no corner, but all show walls; where a wall ends changes from scan to scan, and that is part of its scatter."),
+      el("p", { class: "muted" }, "The same for the direction and distance of walls. Many rooms show no corner, but all show walls; where a wall ends changes from scan to scan, and that is part of its scatter."),
     ),
     el(
       "section",

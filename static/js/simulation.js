@@ -23,7 +23,7 @@ const GROUPS = [
 const LABELS = {
   sigma_range: "Range noise",
   sigma_bearing: "Bearing noise",
-  mixed: "Mixed beams",
+  mixed: "Mixed pixels",
   scale: "Distance error",
   track: "Rotation error",
 };

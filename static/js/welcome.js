@@ -20,8 +20,8 @@ const WHENCE = {
 };
 
 const STEPS = [
-  ["Compare methods", "Which method's ellipse is true? All of them on one corner, as their papers publish them", compare],
-  ["Calibrate my sensor", "Measures the noise of this sensor, which has to stand still, so that ellipses are true", calibrate],
+  ["Compare methods", "Which method's ellipse is true? Shows all methods on one corner, with the ellipses their papers publish", compare],
+  ["Calibrate my sensor", "Measures the noise of this sensor, so that its ellipses are true. It has to stand still meanwhile", calibrate],
   ["Build a map", "A simulated robot drives through rooms with doors, and the map grows", buildMap],
 ];
 

@@ -198,7 +198,7 @@ def test_a_landmark_tells_its_history_also_when_it_was_removed(maps: Maps) -> No
         ("", {"x": "nan", "y": 1, "radius": 1}, "x"),
         ("", {"x": 1, "y": 1, "radius": -1}, "radius"),
         ("", {"x": 1, "y": 1, "radius": 1, "bbox": "0,0,1,1"}, "not both"),
-        ("", {"since": 2, "until": 1}, "since is 2 s, after until, 1 s"),
+        ("", {"since": 2, "until": 1}, "since (2 s) is after until (1 s)"),
         ("", {"since": "nan"}, "since: Input should be a finite"),
         ("", {"until": "nan"}, "until: Input should be a finite"),
         ("", {"x": 1e200, "y": 1, "radius": 1}, "x: Input should be less"),

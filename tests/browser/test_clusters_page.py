@@ -48,7 +48,7 @@ def test_method_is_switched_live_and_shows_only_what_it_uses(visitor: Visitor) -
 def test_number_of_clusters_is_chosen_by_the_page_or_for_every_scan(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     server.patch("settings", {"clusters": {"method": "kmeans"}, "view": {"layers": {"clusters": True}}})
-    number = page.get_by_role("spinbutton", name="Number, k")
+    number = page.get_by_role("spinbutton", name="Clusters, k")
     expect(number).to_have_attribute("placeholder", "auto")
     number.fill("4")
     page.keyboard.press("Enter")

@@ -260,7 +260,7 @@ def test_no_bearing_noise_is_made_of_uneven_walls(data):
 
 @pytest.mark.parametrize(
     ("output", "said"),
-    [("nosuch/x.json", "is no file in a folder that exists"), ("x.txt", "should end in .json")],
+    [("nosuch/x.json", "is not a file in a folder that exists"), ("x.txt", "should end in .json")],
 )
 def test_the_command_refuses_an_output_before_it_reads(tmp_path, output, said):
     """The recording is not there either, and would be told of next."""

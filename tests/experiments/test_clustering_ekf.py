@@ -218,5 +218,6 @@ def test_a_report_that_cannot_be_written_is_told_before_the_work(tmp_path: Path)
         done = subprocess.run([*command, str(output)], capture_output=True, text=True, timeout=60)
         assert done.returncode == 2
         assert (
-            done.stderr == f"lidarcore: {output}: is no file in a folder that exists, give one for --output\n"
+            done.stderr
+            == f"lidarcore: {output}: is not a file in a folder that exists; give one for --output\n"
         )

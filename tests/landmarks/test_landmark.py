@@ -17,7 +17,7 @@ from lidarcore.landmarks import Box, Circle, Filter, Landmark
         ({"y": -math.inf}, "finite"),
         ({"last_seen": math.nan}, "finite"),
         ({"x": 2e7}, "metres"),
-        ({"last_seen": 1e300}, "1e\\+300 s is no time: give seconds"),
+        ({"last_seen": 1e300}, "1e\\+300 s is not a time: give seconds"),
         ({"first_seen": -1.8e12}, "give seconds"),
         ({"var_x": math.nan}, "positive definite"),
         ({"cov_xy": math.nan}, "positive definite"),

@@ -367,7 +367,7 @@ def spoil(path, *statements):
     [
         ("PRAGMA user_version = 99", "update lidarcore"),
         ("UPDATE about SET unit = 'mm'", "'mm', not in metres"),
-        ("PRAGMA application_id = 5", "no map of landmarks"),
+        ("PRAGMA application_id = 5", "not a landmark map"),
         ("DROP TABLE about", "are not those of a landmark map"),
     ],
 )

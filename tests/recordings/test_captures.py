@@ -96,7 +96,7 @@ def test_a_capture_survives_the_end_of_its_process(tmp_path):
 )
 def test_other_files_are_no_captures(tmp_path, content):
     (tmp_path / "a").write_bytes(content)
-    with pytest.raises(RecordingError, match=r"no capture|another version"):
+    with pytest.raises(RecordingError, match=r"not a capture|another version"):
         list(read_capture(tmp_path / "a"))
 
 

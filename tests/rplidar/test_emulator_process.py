@@ -45,7 +45,7 @@ def test_it_takes_options_and_gives_the_port_at_the_path_asked_for(tmp_path):
         emulator.close()
         assert not os.path.lexists(link)
         assert not psutil.pid_exists(emulator.pid)
-        with pytest.raises(DeviceError, match="not running any more"):
+        with pytest.raises(DeviceError, match="no longer running"):
             emulator.command("unplug")
 
 
@@ -60,7 +60,7 @@ def test_killed_it_leaves_no_port_no_folder_and_no_zombie(tmp_path, options):
         assert not os.path.lexists(emulator.port)
         assert Path(emulator.port).parent.exists() == bool(options)
         assert not psutil.pid_exists(emulator.pid)
-        with pytest.raises(DeviceError, match="not running any more"):
+        with pytest.raises(DeviceError, match="no longer running"):
             emulator.command("unplug")
 
 

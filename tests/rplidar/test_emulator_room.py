@@ -118,7 +118,7 @@ def test_what_is_no_capture_is_refused(tmp_path, capsys):
     (tmp_path / "text").write_text("room\n")
     with CaptureWriter(tmp_path / "strange", Stream(0x07)) as capture:
         capture.write("in", 0.0, b"?")
-    faults = {"text": "no capture", "nothing": "No such file", ".": "Is a directory", "strange": "type 7"}
+    faults = {"text": "not a capture", "nothing": "No such file", ".": "Is a directory", "strange": "type 7"}
     for name, cause in faults.items():
         with pytest.raises(SystemExit) as ended:
             main([f"--replay={tmp_path / name}"])

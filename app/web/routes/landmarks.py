@@ -116,7 +116,7 @@ async def _filter(
 ) -> Filter:
     """Which landmarks count. Raises ProblemError 422 if since is after until."""
     if since > until:
-        raise ProblemError(422, f"since is {since:.15g} s, after until, {until:.15g} s: exchange them.")
+        raise ProblemError(422, f"since ({since:.15g} s) is after until ({until:.15g} s): swap them.")
     return Filter(
         kinds=tuple(kind),
         methods=tuple(method),

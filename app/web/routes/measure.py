@@ -89,7 +89,7 @@ def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
         raise ProblemError(422, MIXED)
     a, b = (_nearest(frame, place) for place in (first, second))
     if a.feature == b.feature:
-        raise NotFoundError("Both places are at the same thing: give places at two.")
+        raise NotFoundError("Both places are on the same wall or corner: give places on two different ones.")
     walls = a.feature.kind == b.feature.kind == "wall"
     if first.startswith("map-"):
         found = of_map.distance(_map(frame), a.feature, b.feature)
@@ -114,7 +114,7 @@ def _nearest(frame: Frame, place: str) -> _Found:
     features, ids, spots = _of_map(frame, kind, at) if kind.startswith("map-") else _of_scan(frame, kind, at)
     ways = np.hypot(*(spots - at).T)
     if not len(ways) or ways.min() > SNAP:
-        raise NotFoundError(f"There is no {kind} within {SNAP} m of {xy}: give a place at one.")
+        raise NotFoundError(f"There is no {kind} within {SNAP} m of {xy}: give a place nearer to one.")
     nearest = int(ways.argmin())
     x, y = spots[nearest].tolist()
     return _Found(features[nearest], {"kind": cast(Kind, kind), "id": ids[nearest], "at": (x, y)})

@@ -44,10 +44,10 @@ def start(
     """Record the live source from now on into the recordings folder, as MCAP that ROS 2 tools open."""
     source = runtime.player.source
     if not source.live:
-        raise ConflictError("A recording plays: only what is live can be recorded.")
+        raise ConflictError("A recording is playing: only a live source can be recorded.")
     sensor = source if isinstance(source, LiveSource) else None
     if start.raw and sensor is None:
-        raise ConflictError("A simulation has no port: there are no bytes to record, leave raw out.")
+        raise ConflictError("A simulation has no port, and so no bytes to record: leave raw out.")
     name = start.name or f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
     path = library.new(name if name.endswith(SUFFIX) else name + SUFFIX)
     raw = library.new(path.stem + RAW_SUFFIX) if start.raw else None

@@ -76,7 +76,7 @@ def obey(runtime: CurrentRuntime, fault: Annotated[Fault, Body(examples=[{"comma
     """Have the emulated sensor show a fault, to see what becomes of it."""
     source = runtime.player.source
     if not isinstance(source, LiveSource) or source.emulator is None:
-        raise ConflictError('No emulator plays: PUT {"kind": "emulator"} to /api/v1/source first.')
+        raise ConflictError('No emulator is playing: PUT {"kind": "emulator"} to /api/v1/source first.')
     source.emulator.command(fault.command)
 
 

@@ -81,7 +81,7 @@ async def _wanted(
     """Which walls count. Raises ProblemError 422 if the lengths are exchanged."""
     if min_length > max_length:
         raise ProblemError(
-            422, f"min_length is {min_length:g} m, above max_length, {max_length:g} m: exchange them."
+            422, f"min_length ({min_length:g} m) is above max_length ({max_length:g} m): swap them."
         )
 
     def which(walls: WallTable) -> Mask:
