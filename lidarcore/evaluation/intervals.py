@@ -40,6 +40,15 @@ class Interval:
         return Interval(value, low, high)
 
 
+UNKNOWN = Interval(np.nan, np.nan, np.nan)
+
+
+def intervals(told: Array) -> list[Interval]:
+    """One after another, of figures and the ends of their intervals (3, ...); all that are not known are UNKNOWN."""
+    rows = zip(*told.reshape(3, -1).tolist(), strict=True)
+    return [Interval(*row) if row[0] == row[0] else UNKNOWN for row in rows]
+
+
 def mean(values: ArrayLike) -> Interval:
     """Mean of independent runs (R,), with Student's t; one run says nothing of its error."""
     x = np.asarray(values, np.float64)
@@ -53,29 +62,34 @@ def ratio(numerators: Array, denominators: Array) -> Interval:
     """
     blocks, total = len(numerators), float(denominators.sum())
     if total == 0:
-        return Interval(np.nan, np.nan, np.nan)
+        return UNKNOWN
     value = float(numerators.sum()) / total
     if blocks < 2:
         return Interval(value, -np.inf, np.inf)
-    half = float(stdtrit(blocks - 1, (1 + LEVEL) / 2)) * _standard_error(numerators, denominators, value)
+    half = float(stdtrit(blocks - 1, (1 + LEVEL) / 2)) * float(
+        _standard_error(numerators, denominators, value)
+    )
     return Interval(value, value - half, value + half)
 
 
 def share(hits: Array, trials: Array) -> Interval:
-    """The interval of a share of trials: Wilson's, which stays within 0 and 1.
+    """The interval of a share of trials, by blocks (B,), as `shares` tells it."""
+    (one,) = intervals(shares(hits, trials))
+    return one
+
+
+def shares(hits: Array, trials: Array) -> Array:
+    """(3, ...) shares of trials (..., B) and the ends of Wilson's intervals, which stay within 0 and 1.
 
     Its number of trials is that of independent ones with the scatter between blocks; all of them where the share is
-    0 or 1 and nothing scatters.
+    0 or 1 and nothing scatters. NaN where there are no trials.
     """
-    n = float(trials.sum())
-    if n == 0:
-        return Interval(np.nan, np.nan, np.nan)
-    p = float(hits.sum()) / n
-    variance = _standard_error(hits, trials, p) ** 2 if len(hits) > 1 else 0.0
-    if variance > 0:
-        n = min(n, p * (1 - p) / variance)
-    low, high = wilson(np.array(p), np.array(n))
-    return Interval(p, float(low), float(high))
+    n, blocks = trials.sum(-1), hits.shape[-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        p = hits.sum(-1) / n
+        variance = _standard_error(hits, trials, p) ** 2 if blocks > 1 else np.zeros_like(p)
+        n = np.where(variance > 0, np.minimum(n, p * (1 - p) / variance), n)
+        return np.array([p, *wilson(p, n)])
 
 
 def wilson(p: Array, n: Array) -> tuple[Array, Array]:
@@ -85,7 +99,9 @@ def wilson(p: Array, n: Array) -> tuple[Array, Array]:
     return np.maximum(middle - half, 0.0), np.minimum(middle + half, 1.0)
 
 
-def _standard_error(numerators: Array, denominators: Array, value: float) -> float:
-    blocks = len(numerators)
-    scatter = float(np.square(numerators - value * denominators).sum())
-    return float(np.sqrt(scatter * blocks / (blocks - 1))) / float(denominators.sum())
+def _standard_error(numerators: Array, denominators: Array, value: ArrayLike) -> Array:
+    """(...) of ratios with that value (...), from blocks (..., B)."""
+    blocks = numerators.shape[-1]
+    scatter = np.square(numerators - np.expand_dims(value, -1) * denominators).sum(-1)
+    error: Array = np.sqrt(scatter * blocks / (blocks - 1)) / denominators.sum(-1)
+    return error

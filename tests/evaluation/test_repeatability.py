@@ -117,7 +117,7 @@ def verdicts(corners, claim, studies, seed=0):
     table[..., 2:6] = table[..., 6:] = np.ravel(claim)
     ids, at = np.repeat(np.arange(corners), scans), np.tile(np.arange(scans), corners)
     found = scatter(Observations(ids, at, table), scans)
-    words = Counter(verdict(found.judgement(m, 0)) for m in range(studies))
+    words = Counter(verdict(published) for published, _ in found.judgements())
     return {word: words[word] / studies for word in ("true", "too small", "too large", "open")}
 
 

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lidarcore.evaluation.repeatability.wall_tracker import WallTracker, unwrapped
+from lidarcore.evaluation.repeatability.wall_tracker import WallTracker, told_near
 from lidarcore.extraction import extract
 from lidarcore.features import Features
 from lidarcore.noise import SensorNoise
@@ -86,10 +86,9 @@ def _sightings(scans: list[Scan], noise: SensorNoise, share: float) -> dict[int,
     tracker, seen = WallTracker(memory=len(scans), follow=0.1), dict[int, list[Array]]()
     for scan in scans:
         found: Features = extract(scan, settings)
-        for row in tracker.rows({found.fitter: found}):
-            line = found.lines[row.index[found.fitter]]
-            alpha, r = unwrapped(line.alpha, line.r, row.near)
-            turned = np.array([1.0, 1.0, 1.0, 1.0] if r >= 0 else [1.0, -1.0, -1.0, 1.0])
-            sighting = np.concatenate([[alpha, r], turned * line.covariance_consistent.ravel()])
+        rows, lines = tracker.rows({found.fitter: found}), found.lines
+        walls = [row.index[found.fitter] for row in rows]
+        table = np.column_stack([lines.alpha, lines.r, lines.covariance_consistent.reshape(-1, 4)])[walls]
+        for row, sighting in zip(rows, told_near(table, np.array([row.near for row in rows])), strict=True):
             seen.setdefault(row.id, []).append(sighting)
     return {wall: np.array(rows) for wall, rows in seen.items()}

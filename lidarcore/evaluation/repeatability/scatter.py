@@ -1,8 +1,10 @@
 """The scatter of corners and walls that stand still against the ellipses methods claim for them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import cast
+from functools import cached_property
+from itertools import pairwise
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +12,9 @@ from scipy.special import chdtri
 
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.consistency.figures import GATES
-from lidarcore.evaluation.intervals import LEVEL, Interval, share, wilson
-from lidarcore.evaluation.repeatability.summary import FeatureClaim, FeatureScatter, Judgement
+from lidarcore.evaluation.intervals import LEVEL, intervals, shares, wilson
+from lidarcore.evaluation.repeatability.summary import FeatureClaim, FeatureScatter, Judgement, Matrix
 from lidarcore.scan import Array, Ints
-from lidarcore.tables import CORNER_CONSISTENT, CORNER_PUBLISHED
 
 LEAST = 10
 """A corner or wall seen fewer times is not judged."""
@@ -21,6 +22,7 @@ SIGHTING = 10
 """Numbers of a sighting: x, y of a corner or alpha, r of a wall; published (4), consistent (4)."""
 
 Mask = NDArray[np.bool_]
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +42,7 @@ class Observations:
         return np.flatnonzero(np.diff(self.ids, prepend=-1))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Scatter:
     """Figures of K features and M methods; claims of both KINDS.
 
@@ -62,7 +64,7 @@ class Scatter:
         """Whether any feature was seen often enough."""
         return bool((self.counts >= LEAST).any())
 
-    @property
+    @cached_property
     def actual(self) -> Array:
         """(K, M) root(det) of the covariance of the scatter, without bias.
 
@@ -75,59 +77,79 @@ class Scatter:
 
     def claimed(self, kind: int) -> Array:
         """(K, M) root(det) of the mean claimed covariance."""
-        return _root_det(self.means[..., _columns(kind)])
+        claimed: Array = self._claimed[..., kind]
+        return claimed
 
-    def features(self, method: int) -> Iterator[FeatureScatter]:
-        """Those that the method saw often enough, by their ids."""
-        good = np.flatnonzero(self.counts[:, method] >= LEAST)
-        n, actual = self.counts[good, method], self.actual[good, method]
-        claims = [self._claims(good, method, kind, actual) for kind in range(len(KINDS))]
+    @cached_property
+    def _claimed(self) -> Array:
+        return _root_det(covariances(self.means))
+
+    def features(self) -> list[tuple[FeatureScatter, ...]]:
+        """By method those that it saw often enough, by their ids."""
+        method, good = np.nonzero(self.counts.T >= LEAST)
+        at = good, method
+        n, actual = self.counts[at], self.actual[at]
+        x, y = self.means[at][:, :2].T.tolist()
+        xx, xy, yy = (self.squares[at] / (n - 1)[:, None]).T.tolist()
         rows = zip(
             self.ids[good].tolist(),
             n.astype(int).tolist(),
-            self.means[good, method, :2].tolist(),
-            (self.squares[good, method] / (n - 1)[:, None]).tolist(),
+            zip(x, y, strict=True),
+            _matrices(xx, xy, yy),
             (np.pi * actual).tolist(),
-            *claims,
+            self._claims(at),
             strict=True,
         )
-        for number, count, (x, y), (xx, xy, yy), area, *claimed in rows:
-            by_kind = dict(zip(KINDS, claimed, strict=True))
-            yield FeatureScatter(number, count, (x, y), ((xx, xy), (xy, yy)), area, by_kind)
+        features = [FeatureScatter(*row) for row in rows]
+        ends = np.cumsum(np.bincount(method, minlength=self.counts.shape[1])).tolist()
+        return [tuple(features[begin:end]) for begin, end in pairwise([0, *ends])]
 
-    def _claims(self, good: Ints, method: int, kind: int, actual: Array) -> list[FeatureClaim]:
-        n, claimed = self.counts[good, method], self.claimed(kind)[good, method]
-        areas = _area_ratios(claimed, actual, 2 * n - 4)
-        shares = self.hits[good, method, kind] / n[:, None]
-        covers = np.array([shares, *wilson(shares, n[:, None])])  # (3, G, levels)
-        covariances = self.means[good, method, _columns(kind)].tolist()
-        return [
-            FeatureClaim(
-                ((xx, xy), (xy, yy)), area, Judgement(Interval(*area_ratio), *(Interval(*c) for c in cover))
-            )
-            for (xx, xy, _, yy), area, area_ratio, cover in zip(
-                covariances,
-                (np.pi * claimed).tolist(),
-                areas.T.tolist(),
-                covers.transpose(1, 2, 0).tolist(),
-                strict=True,
-            )
-        ]
+    def _claims(self, at: tuple[Ints, Ints]) -> Iterator[dict[str, FeatureClaim]]:
+        n, claimed = self.counts[at], self._claimed[at]  # (G,), (G, kinds)
+        ratios = _area_ratios(claimed, self.actual[at][:, None], (2 * n - 4)[:, None])
+        shares = self.hits[at] / n[:, None, None]
+        covers = np.array([shares, *wilson(shares, n[:, None, None])])  # (3, G, kinds, levels)
+        xx, xy, _, yy = covariances(self.means[at]).reshape(-1, 4).T.tolist()
+        areas = (np.pi * claimed).ravel().tolist()
+        rows = zip(_matrices(xx, xy, yy), areas, _judgements(ratios, covers), strict=True)
+        claims = [FeatureClaim(*row) for row in rows]
+        return (dict(zip(KINDS, by_kind, strict=True)) for by_kind in _batched(claims, len(KINDS)))
 
-    def judgement(self, method: int, kind: int) -> Judgement:
-        """All features together: the sum of their areas, and the share of all residuals.
+    def judgements(self) -> list[tuple[Judgement, ...]]:
+        """By method and kind all features together: the sum of their areas, and the share of all residuals.
 
         The interval of coverage is made of the scatter between scans, whose errors are independent. That of areas takes
         the scatter for Gaussian and independent from one to another (Satterthwaite for the sum of their areas).
         """
+        hits, trials = np.moveaxis(self.scan_hits, 0, -1), np.moveaxis(self.scan_counts, 0, -1)
+        covers = shares(hits, trials[:, None, None])  # (3, M, kinds, levels)
+        ratios = np.stack([self._ratios(method) for method in range(len(trials))], 1)
+        return list(_batched(_judgements(ratios, covers), len(KINDS)))
+
+    def _ratios(self, method: int) -> Array:
+        """(3, kinds) claimed over actual area of all features, and the ends of its interval."""
         good = self.counts[:, method] >= LEAST
-        actual, claimed = self.actual[good, method], self.claimed(kind)[good, method]
-        hits, trials = self.scan_hits[:, method, kind], self.scan_counts[:, method]
-        covers = [share(h, trials) for h in hits.T]
+        actual = self.actual[good, method]
         if not actual.any():
-            return Judgement(Interval(np.nan, np.nan, np.nan), *covers)
+            return np.full((3, len(KINDS)), np.nan)
         dof = 2 * actual.sum() ** 2 / (actual**2 / (self.counts[good, method] - 2)).sum()
-        return Judgement(Interval(*_area_ratios(claimed.sum(), actual.sum(), dof).tolist()), *covers)
+        claimed = np.array([self.claimed(kind)[good, method].sum() for kind in range(len(KINDS))])
+        return _area_ratios(claimed, actual.sum(), dof)
+
+
+def _judgements(ratios: Array, covers: Array) -> list[Judgement]:
+    """One after another, from figures and the ends of their intervals: ratios (3, ...), covers (3, ..., levels)."""
+    figures = np.concatenate([ratios[..., None], covers], -1)
+    return [Judgement(*four) for four in _batched(intervals(figures), figures.shape[-1])]
+
+
+def _matrices(xx: list[float], xy: list[float], yy: list[float]) -> Iterator[Matrix]:
+    return (((a, b), (b, c)) for a, b, c in zip(xx, xy, yy, strict=True))
+
+
+def _batched(items: Iterable[Item], n: int) -> Iterator[tuple[Item, ...]]:
+    """So many at a time, as itertools of Python 3.12 has it."""
+    return zip(*[iter(items)] * n, strict=True)
 
 
 _TAILS = ((1 + LEVEL) / 2, (1 - LEVEL) / 2)  # upper ones, of the lower end and of the upper
@@ -140,41 +162,51 @@ def scatter(sightings: Observations, scans: int) -> Scatter:
     Divided by that factor, its squared Mahalanobis distance is chi-square as that of a true error is. No law of
     Hotelling's is needed: the claim C is not estimated from the scatter.
     """
-    table, starts = sightings.table, sightings.starts
-    feature = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(table)))
-    seen: Mask = np.isfinite(table[..., 0])
+    table, starts = np.ascontiguousarray(np.moveaxis(sightings.table, 0, -1)), sightings.starts
+    feature = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(sightings.ids)))
+    seen: Mask = np.isfinite(table[:, 0])  # (M, R); sums are quickest along the last axis
     counts = _sums(seen.astype(np.float64), starts)
-    means = _sums(np.where(seen[..., None], table, 0.0), starts) / np.maximum(counts, 1)[..., None]
-    x, y = np.moveaxis(np.where(seen[..., None], table[..., :2] - means[feature, :, :2], 0.0), -1, 0)
-    squares = np.stack([x * x, x * y, y * y], -1)
-    judged = seen & (counts >= LEAST)[feature]
-    shrunk = (1 - 1 / np.maximum(counts, LEAST))[feature]
-    hits = np.zeros((*seen.shape, len(KINDS), len(GATES)))
-    for kind in range(len(KINDS)):
-        nees = _mahalanobis(squares, table[..., _columns(kind)]) / shrunk
-        hits[:, :, kind] = (nees[..., None] <= GATES) & judged[..., None]
-    order = np.argsort(sightings.scans, kind="stable")
-    at = np.flatnonzero(np.diff(sightings.scans[order], prepend=-1))
-    scan_hits, scan_counts = np.zeros((scans, *hits.shape[1:])), np.zeros((scans, seen.shape[1]))
-    present = sightings.scans[order][at]
-    scan_hits[present], scan_counts[present] = (
-        _sums(hits[order], at),
-        _sums(judged[order].astype(np.float64), at),
+    means = _sums(np.where(seen[:, None], table, 0.0), starts) / np.maximum(counts, 1)[:, None]
+    x, y = np.where(seen[:, None], table[:, :2] - means[:, :2, feature], 0.0).swapaxes(0, 1)
+    squares = np.stack([x * x, x * y, y * y], 1)
+    shrunk = (1 - 1 / np.maximum(counts, LEAST))[:, feature]
+    nees = (
+        _mahalanobis(squares[:, None], table[:, 2:].reshape(len(table), len(KINDS), 4, -1)) / shrunk[:, None]
     )
+    judged = seen & (counts >= LEAST)[:, feature]
+    hits = _tally(nees, judged, feature, len(starts))
+    scan_hits = _tally(nees, judged, sightings.scans, scans)
     return Scatter(
         sightings.ids[starts],
-        counts,
-        means,
-        _sums(squares, starts),
-        _sums(hits, starts),
-        scan_hits,
-        scan_counts,
+        counts.T,
+        np.moveaxis(means, -1, 0),
+        np.moveaxis(_sums(squares, starts), -1, 0),
+        hits[..., :-1],
+        scan_hits[..., :-1],
+        scan_hits[:, :, 0, -1],
     )
+
+
+def _tally(nees: Array, judged: Mask, groups: Ints, n: int) -> Array:
+    """(n, M, 2, 4) of residuals (M, 2, R) in n groups (R,): those within the ellipses of GATES, and all; none else."""
+    cells = np.arange(np.prod(nees.shape[:2])).reshape(*nees.shape[:2], 1)
+    within = sum(
+        (nees <= gate).astype(np.int64) for gate in GATES
+    )  # of 1, 2 or 3, as larger ones hold it, too
+    keys = (groups * cells.size + cells) * (len(GATES) + 2) + np.where(judged[:, None], within + 1, 0)
+    shape = (n, *nees.shape[:2], len(GATES) + 2)
+    counts = np.bincount(keys.ravel(), minlength=int(np.prod(shape))).reshape(shape)
+    return np.cumsum(counts[..., :0:-1], -1).astype(np.float64)
 
 
 def one_sigma_areas(table: Array) -> Array:
     """(..., 2) areas of the claimed one-sigma ellipses of sightings (..., SIGHTING), by KINDS."""
-    return np.stack([np.pi * _root_det(table[..., _columns(kind)]) for kind in range(len(KINDS))], -1)
+    return np.pi * _root_det(covariances(table))
+
+
+def covariances(table: Array) -> Array:
+    """(..., 2, 4) claimed of sightings (..., SIGHTING), by KINDS."""
+    return table[..., 2:].reshape(*table.shape[:-1], len(KINDS), 4)
 
 
 def _area_ratios(claimed: Array, actual: Array, dof: Array) -> Array:
@@ -184,25 +216,24 @@ def _area_ratios(claimed: Array, actual: Array, dof: Array) -> Array:
     return np.array([over, *(over * chdtri(dof, p) / dof for p in _TAILS)])
 
 
-def _columns(kind: int) -> slice:
-    start = (CORNER_PUBLISHED, CORNER_CONSISTENT)[kind]
-    return slice(start, start + 4)
-
-
 def _root_det(c: Array) -> Array:
     root: Array = np.sqrt(np.maximum(c[..., 0] * c[..., 3] - c[..., 1] * c[..., 2], 0.0))
     return root
 
 
 def _mahalanobis(squares: Array, c: Array) -> Array:
-    """e^T C^-1 e from the products xx, xy, yy of e; NaN, which no ellipse holds, where C is NaN."""
-    xx, xy, yy = np.moveaxis(squares, -1, 0)
+    """e^T C^-1 e (..., R) from the products xx, xy, yy of e (..., 3, R) and C (..., 4, R).
+
+    NaN, which no ellipse holds, where C is NaN.
+    """
+    xx, xy, yy = np.moveaxis(squares, -2, 0)
+    c_xx, c_xy, _, c_yy = np.moveaxis(c, -2, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return cast(Array, (c[..., 3] * xx - 2 * c[..., 1] * xy + c[..., 0] * yy) / _root_det(c) ** 2)
+        return cast(Array, (c_yy * xx - 2 * c_xy * xy + c_xx * yy) / _root_det(np.moveaxis(c, -2, -1)) ** 2)
 
 
 def _sums(values: Array, starts: Ints) -> Array:
-    """Sums over stretches of the first axis that begin at `starts`."""
+    """Sums over stretches of the last axis that begin at `starts`."""
     if not len(starts):
-        return np.zeros((0, *values.shape[1:]))
-    return np.add.reduceat(values, starts, axis=0)
+        return np.zeros((*values.shape[:-1], 0))
+    return np.add.reduceat(values, starts, axis=-1)

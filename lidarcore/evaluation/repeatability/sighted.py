@@ -1,8 +1,10 @@
 """Features of one kind in the last scans of a sensor that stands still: what was seen of them, and what that says."""
 
+from bisect import bisect_left, bisect_right
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 
@@ -18,17 +20,19 @@ from lidarcore.evaluation.repeatability.scatter import (
     scatter,
 )
 from lidarcore.evaluation.repeatability.summary import WHISKER, Box, Claim, FeatureScatter, verdict
-
-Row = tuple[int, Mapping[str, int]]
-"""Id of a feature, and its index in each method that found it."""
+from lidarcore.evaluation.repeatability.wall_tracker import WallRow
+from lidarcore.tracking import CornerRow
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Record:
-    """One scan: ids (K,); table (K, M, SIGHTING), NaN where not found; areas (M, 2), medians over the features."""
+    """One scan: ids (K,); table (K, M, SIGHTING), NaN where not found; places (K, 2), the coordinates by the first
+    method that has them; areas (M, 2), medians over the features.
+    """
 
     ids: Ints
     table: Array
+    places: Array
     areas: Array
 
 
@@ -47,26 +51,27 @@ class Sighted:
         """Forget every scan."""
         self._records.clear()
 
-    def add(self, rows: Iterable[Row], seen: Mapping[str, Array]) -> None:
-        """One more scan: the rows of its features, and what each method saw (N, SIGHTING), NaN where nothing."""
-        listed = list(rows)
-        table = np.full((len(listed), len(self.methods), SIGHTING), np.nan)
-        for m, name in enumerate(self.methods):
-            at = [k for k, (_, index) in enumerate(listed) if name in index]
-            table[at, m] = seen[name][[listed[k][1][name] for k in at]]
-        ids = np.array([number for number, _ in listed], np.int64)
-        self._records.append(_Record(ids, table, _medians(one_sigma_areas(table))))
+    def add(self, rows: Sequence[CornerRow | WallRow], table: Array) -> None:
+        """One more scan: its features, and what each method saw of them (K, M, SIGHTING), NaN where nothing."""
+        ids, first = np.array([row.id for row in rows], np.int64), np.isfinite(table[..., 0]).argmax(1)
+        places = table[np.arange(len(table)), first, :2]
+        self._records.append(_Record(ids, table, places, _medians(one_sigma_areas(table))))
 
     def sightings(self) -> Observations:
         """All of the window, sorted by feature."""
-        records = self._records
-        if not records:
-            nothing = np.empty(0, np.int64)
-            return Observations(nothing, nothing, np.empty((0, len(self.methods), SIGHTING)))
-        ids = np.concatenate([record.ids for record in records])
-        scans = np.repeat(np.arange(len(records)), [len(record.ids) for record in records])
+        return self._sorted(
+            [record.table for record in self._records] or [np.empty((0, len(self.methods), SIGHTING))]
+        )
+
+    def firsts(self) -> Observations:
+        """The two coordinates (R, 2) of each sighting by the first method that has it, sorted by feature."""
+        return self._sorted([record.places for record in self._records] or [np.empty((0, 2))])
+
+    def _sorted(self, tables: Sequence[Array]) -> Observations:
+        ids = np.concatenate([np.empty(0, np.int64), *(record.ids for record in self._records)])
+        scans = np.repeat(np.arange(len(self)), [len(record.ids) for record in self._records])
         order = np.argsort(ids, kind="stable")
-        return Observations(ids[order], scans[order], np.concatenate([r.table for r in records])[order])
+        return Observations(ids[order], scans[order], np.concatenate(tables)[order])
 
     def scatter(self) -> Scatter:
         """The figures of the window."""
@@ -76,10 +81,22 @@ class Sighted:
         self, found: Scatter
     ) -> list[tuple[str, float | None, dict[str, Claim], tuple[FeatureScatter, ...]]]:
         """For each method its name, the median area of the scatter, its claims, and each feature judged."""
-        areas = np.array([record.areas for record in self._records]).reshape(
-            -1, len(self.methods), len(KINDS)
-        )
-        return [(name, *_claims(m, found, areas[:, m])) for m, name in enumerate(self.methods)]
+        areas = np.array([record.areas for record in self._records])
+        boxes = _boxes(areas.reshape(len(self), len(self.methods) * len(KINDS)))
+        return [
+            (
+                name,
+                median(feature.area for feature in features) if features else None,
+                {
+                    kind: Claim(next(boxes), judged, verdict(judged))
+                    for kind, judged in zip(KINDS, by_kind, strict=True)
+                },
+                features,
+            )
+            for name, by_kind, features in zip(
+                self.methods, found.judgements(), found.features(), strict=True
+            )
+        ]
 
     def deviations(self, number: int) -> dict[str, Array]:
         """(N, 2) by method: where it saw the feature of that id, from the mean over the window, the oldest first.
@@ -119,24 +136,19 @@ def _medians(values: Array) -> Array:
     return medians
 
 
-def _claims(
-    m: int, found: Scatter, areas: Array
-) -> tuple[float | None, dict[str, Claim], tuple[FeatureScatter, ...]]:
-    features = tuple(found.features(m))
-    actual = float(np.median([feature.area for feature in features])) if features else None
-    judged = [found.judgement(m, k) for k in range(len(KINDS))]
-    claims: dict[str, Claim] = {
-        kind: Claim(_box(areas[:, k]), judged[k], verdict(judged[k])) for k, kind in enumerate(KINDS)
-    }
-    return actual, claims, features
+def _boxes(values: Array) -> Iterator[Box | None]:
+    """Of each column of (N, C) without NaN; None for one where there is nothing else."""
+    ordered = np.sort(values, axis=0)  # NaN last
+    counts = np.isfinite(values).sum(0)
+    quartiles = np.full((3, len(counts)), np.nan)
+    for n in np.unique(counts[counts > 0]):
+        quartiles[:, counts == n] = np.quantile(ordered[:n, counts == n], (0.25, 0.5, 0.75), axis=0)
+    for kept, n, box in zip(ordered.T.tolist(), counts.tolist(), quartiles.T.tolist(), strict=True):
+        yield _box(kept[:n], *box) if n else None
 
 
-def _box(values: Array) -> Box | None:
-    kept = np.sort(values[np.isfinite(values)])
-    if not len(kept):
-        return None
-    first, median, third = np.quantile(kept, (0.25, 0.5, 0.75)).tolist()
+def _box(kept: list[float], first: float, middle: float, third: float) -> Box:
     reach = WHISKER * (third - first)
-    inside = (kept >= first - reach) & (kept <= third + reach)
-    low, high = kept[inside][[0, -1]].tolist()
-    return Box(low, first, median, third, high, tuple(kept[~inside].tolist()), len(kept))
+    begin, end = bisect_left(kept, first - reach), bisect_right(kept, third + reach)
+    outliers = (*kept[:begin], *kept[end:])
+    return Box(kept[begin], first, middle, third, kept[end - 1], outliers, len(kept))

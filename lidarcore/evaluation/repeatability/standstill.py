@@ -12,12 +12,14 @@ _SIGMAS = 6.0
 _LEAST = 1e-4  # m of a drift: what is the same in every scan differs by rounding
 
 
-def moves(features: Observations, xy: Array, newest: int) -> bool:
-    """Whether features at xy (R, 2) m tell of a sensor that moves; `newest` is the number of the last scan."""
-    first = features.scans[features.starts]
-    last = features.scans[np.append(features.starts[1:], len(features.ids)) - 1] if len(first) else first
+def moves(features: Observations, newest: int) -> bool:
+    """Whether features seen at (R, 2) m tell of a sensor that moves; `newest` is the number of the last scan."""
+    starts = features.starts
+    if not len(starts):
+        return False
+    first, last = features.scans[starts], features.scans[np.append(starts[1:], len(features.ids)) - 1]
     stay = (3 * first <= newest) & (3 * last >= 2 * newest)
-    return _leapt(first, last, newest) or _drifts(features, xy, stay)
+    return _leapt(first, last, newest) or _drifts(features.table, starts, stay)
 
 
 def _leapt(first: Ints, last: Ints, newest: int) -> bool:
@@ -29,15 +31,14 @@ def _leapt(first: Ints, last: Ints, newest: int) -> bool:
     return bool(recent.sum() >= RECENT and new.sum() > _NEW * recent.sum())
 
 
-def _drifts(features: Observations, xy: Array, stay: NDArray[np.bool_]) -> bool:
+def _drifts(xy: Array, starts: Ints, stay: NDArray[np.bool_]) -> bool:
     """Most features that stay in view lie elsewhere in their last third of sightings than in the first.
 
     By _SIGMAS standard errors. What came or went in the middle of the window has nothing to tell of it.
     The noise is taken from successive differences, which a slow drift hardly enters. Real sensors' errors are
     correlated from scan to scan (0.3 in real recordings), so the limit is wider than chance alone would ask for.
     """
-    starts = features.starts
-    n = np.diff(starts, append=len(features.ids))
+    n = np.diff(starts, append=len(xy))
     often: Ints = np.flatnonzero(stay & (n >= LEAST))
     if not len(often):
         return False

@@ -4,20 +4,21 @@
 same in every scan, such as a bias or most of a wall's unevenness, cannot be seen this way.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.repeatability.scatter import LEAST, SIGHTING, Observations
-from lidarcore.evaluation.repeatability.sighted import Row, Sighted
+from lidarcore.evaluation.repeatability.scatter import LEAST
+from lidarcore.evaluation.repeatability.sighted import Sighted
 from lidarcore.evaluation.repeatability.standstill import moves
 from lidarcore.evaluation.repeatability.summary import CornerMethod, Summary, WallMethod, WallSummary
-from lidarcore.evaluation.repeatability.wall_tracker import WallRow, WallTracker, unwrapped
+from lidarcore.evaluation.repeatability.wall_tracker import WallRow, WallTracker, told_near
 from lidarcore.features import Features
 from lidarcore.lines import FITTERS
-from lidarcore.tracking import Tracker
+from lidarcore.tracking import CornerRow, Tracker
 
 WINDOW = 100
 _FOLLOW = 0.1  # of the way to a new sighting that the known place of a feature goes
@@ -68,18 +69,27 @@ class Repeatability:
                 f"The features are without {', '.join(missing)}: compare() with every method."
             )
         features = {name: features[name] for name in self.methods}
-        corners: list[Row] = [(row.id, row.index) for row in self._corner_tracker.rows(features)]
-        self.corners.add(corners, {name: _corners_seen(found) for name, found in features.items()})
-        walls = self._wall_tracker.rows(features)
-        seen = {name: _walls_seen(found, name, walls) for name, found in features.items()}
-        self.walls.add([(row.id, row.index) for row in walls], seen)
+        corners, walls = self._corner_tracker.rows(features), self._wall_tracker.rows(features)
+        self.corners.add(corners, self._table(corners, [_corners_seen(found) for found in features.values()]))
+        table = self._table(walls, [_walls_seen(found) for found in features.values()])
+        near = np.array([row.near for row in walls])
+        self.walls.add(walls, told_near(table, near[:, None]))
         if not self._standing:
             self._watch()
 
+    def _table(self, rows: Sequence[CornerRow | WallRow], seen: Sequence[Array]) -> Array:
+        """(K, M, SIGHTING) of the rows, NaN where a method has none, from what each method saw (N, SIGHTING)."""
+        index = np.array([[row.index.get(name, -1) for name in self.methods] for row in rows], np.int64)
+        index = index.reshape(-1, len(self.methods))
+        begin = np.cumsum([0, *(len(found) for found in seen[:-1])])
+        table: Array = np.concatenate(seen)[index + begin]
+        table[index < 0] = np.nan
+        return table
+
     def _watch(self) -> None:
         """Begin anew if corners or walls say that the sensor moved."""
-        corners, walls, newest = self.corners.sightings(), self.walls.sightings(), len(self) - 1
-        if moves(corners, _first(corners), newest) or moves(walls, _feet(_first(walls)), newest):
+        corners, walls, newest = self.corners.firsts(), self.walls.firsts(), len(self) - 1
+        if moves(corners, newest) or moves(replace(walls, table=_feet(walls.table)), newest):
             self.clear()
             self._moved = True
         elif len(self) == self.window:
@@ -138,28 +148,13 @@ def _corners_seen(found: Features) -> Array:
     return np.column_stack([corners.xy, published, consistent])
 
 
-def _walls_seen(found: Features, name: str, walls: Iterable[WallRow]) -> Array:
-    """(M, SIGHTING), each alpha next to that of the first sighting, so that it does not leap by a turn."""
+def _walls_seen(found: Features) -> Array:
+    """(M, SIGHTING)"""
     lines = found.lines
-    seen = np.full((len(lines), SIGHTING), np.nan)
-    for row in walls:
-        i = row.index.get(name)
-        if i is not None:
-            line = lines[i]
-            alpha, r = unwrapped(line.alpha, line.r, row.near)
-            seen[i, :2] = alpha, r
-            turned = np.array([1.0, 1.0, 1.0, 1.0] if r >= 0 else [1.0, -1.0, -1.0, 1.0])
-            seen[i, 2:6] = turned * line.covariance_published.ravel()
-            seen[i, 6:] = turned * line.covariance_consistent.ravel()
-    return seen
-
-
-def _first(sightings: Observations) -> Array:
-    """(R, 2) of each sighting, by the first method that has it."""
-    table = sightings.table
-    first = np.isfinite(table[..., 0]).argmax(1)
-    pairs: Array = table[np.arange(len(table)), first, :2]
-    return pairs
+    published, consistent = (
+        c.reshape(-1, 4) for c in (lines.covariance_published, lines.covariance_consistent)
+    )
+    return np.column_stack([lines.alpha, lines.r, published, consistent])
 
 
 def _feet(lines: Array) -> Array:

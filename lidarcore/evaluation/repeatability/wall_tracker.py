@@ -1,11 +1,12 @@
 """Walls followed from scan to scan while the sensor stands still."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 
 import numpy as np
+from numpy.typing import NDArray
 
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Ints
 from lidarcore.features import Features
 
 SHARED = 0.5  # of the shorter one, at least, lies side by side with the other
@@ -24,19 +25,32 @@ class WallRow:
     index: Mapping[str, int]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Known:
-    """A wall as it was seen so far: its line, from where to where along it (m), first alpha, last frame."""
+    """K walls as they were seen so far, the oldest first.
 
-    alpha: float
-    r: float
-    begin: float
-    end: float
-    near: float
-    frame: int
+    ids, frames (K,) of the last sighting; near (K,) rad, alpha of the first; lines (K, 4) alpha, r, begin, end: from
+    where to where along it (m).
+    """
+
+    ids: Ints
+    frames: Ints
+    near: Array
+    lines: Array
+
+    @classmethod
+    def nothing(cls) -> "_Known":
+        return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty((0, 4)))
+
+    def __getitem__(self, which: NDArray[np.bool_]) -> "_Known":
+        return _Known(self.ids[which], self.frames[which], self.near[which], self.lines[which])
+
+    def __add__(self, other: "_Known") -> "_Known":
+        return _Known(
+            *(np.concatenate([getattr(one, f.name) for one in (self, other)]) for f in fields(self))
+        )
 
 
-@dataclass
 class WallTracker:
     """Gives every wall an id that it keeps while a piece of about the same line and extent is found.
 
@@ -49,65 +63,71 @@ class WallTracker:
     follow   share of the way to a new sighting that the known wall goes
     """
 
-    memory: int
-    follow: float = 1.0
-    _known: dict[int, _Known] = field(default_factory=dict)
-    _frame: int = 0
-    _next_id: int = 1
+    def __init__(self, memory: int, follow: float = 1.0) -> None:
+        self.memory, self.follow = memory, follow
+        self._known, self._frame, self._next_id = _Known.nothing(), 0, 1
 
     def forget(self) -> None:
         """Another scene: no wall of it is one seen before. Ids are never used again."""
-        self._known.clear()
+        self._known = _Known.nothing()
 
     def rows(self, features: Mapping[str, Features]) -> tuple[WallRow, ...]:
         """The walls of one frame with their ids; extents are those of the first method that has them."""
         self._frame += 1
-        self._known = {i: k for i, k in self._known.items() if self._frame - k.frame <= self.memory}
+        self._known = self._known[self._frame - self._known.frames <= self.memory]
         pieces = _pieces(features)
         lines = _lines(features, pieces)
         noise = max((found.noise_seen for found in features.values()), default=0.0)
-        return tuple(
-            WallRow(number, self._update(number, line), piece)
-            for number, line, piece in zip(self._nearest(lines, noise), lines, pieces, strict=True)
-        )
+        at = self._nearest(lines, noise)
+        self._follow(at[at >= 0], lines[at >= 0])
+        at[at < 0] = self._begin(lines[at < 0])
+        ids, near = self._known.ids[at].tolist(), self._known.near[at].tolist()
+        return tuple(WallRow(*row) for row in zip(ids, near, pieces, strict=True))
 
-    def _update(self, number: int, line: Array) -> float:
-        """Move what is known towards a sighting; the alpha that the wall was first seen with."""
-        alpha, r = line[:2].tolist()
-        known = self._known.get(number)
-        if known is None:
-            begin, end = _along(line, alpha)
-            self._known[number] = _Known(alpha, r, begin, end, alpha, self._frame)
-            return float(alpha)
-        turned, r = unwrapped(alpha, r, known.alpha)
-        begin, end = _along(line, known.alpha)
-        before = np.array([known.alpha, known.r, known.begin, known.end])
-        moved = self.follow * (np.array([turned, r, begin, end]) - before)
-        alpha, r, begin, end = (before + moved).tolist()
-        self._known[number] = _Known(alpha, r, begin, end, known.near, self._frame)
-        return known.near
-
-    def _nearest(self, lines: Array, noise: float) -> list[int]:
-        """The known id for each piece, most shared extent first, each id once; new ids where none is near."""
-        ids = [0] * len(lines)
-        known = list(self._known)
-        table = [(k.alpha, k.r, k.begin, k.end) for k in self._known.values()]
-        shares = shared_extents(lines, np.array(table).reshape(-1, 4), noise)
+    def _nearest(self, lines: Array, noise: float) -> Ints:
+        """(P,) the known wall for each piece (P, 6), most shared extent first, each once; -1 where none is near."""
+        at, taken = [-1] * len(lines), set[int]()
+        shares = shared_extents(lines, self._known.lines, noise)
         for row, column in np.argwhere(shares > 0)[np.argsort(-shares[shares > 0])].tolist():
-            if ids[row] == 0 and known[column] not in ids:
-                ids[row] = known[column]
-        for row in range(len(ids)):
-            if ids[row] == 0:
-                ids[row], self._next_id = self._next_id, self._next_id + 1
-        return ids
+            if at[row] < 0 and column not in taken:
+                at[row] = column
+                taken.add(column)
+        return np.array(at, np.int64)
+
+    def _follow(self, at: Ints, lines: Array) -> None:
+        """Move known walls towards their sightings (P, 6)."""
+        before = self._known.lines[at]
+        alpha, r = unwrapped(lines, before[:, 0])
+        seen = np.column_stack([alpha, r, _along(lines, before[:, 0])])
+        self._known.lines[at] = before + self.follow * (seen - before)
+        self._known.frames[at] = self._frame
+
+    def _begin(self, lines: Array) -> Ints:
+        """Know walls (P, 6) from now on; (P,) where they are kept."""
+        k, n = len(self._known.ids), len(lines)
+        ids, self._next_id = self._next_id + np.arange(n), self._next_id + n
+        alpha = lines[:, 0]
+        seen = np.column_stack([lines[:, :2], _along(lines, alpha)])
+        self._known += _Known(ids, np.full(n, self._frame), alpha, seen)
+        return k + np.arange(n)
 
 
-def unwrapped(alpha: float, r: float, near: float) -> tuple[float, float]:
-    """The same line (alpha rad, r m) with the alpha next to `near`; r < 0 where the normal is turned round for it."""
-    off = float((alpha - near + np.pi) % (2 * np.pi) - np.pi)
-    if abs(off) <= np.pi / 2:
-        return near + off, r
-    return near + off - float(np.copysign(np.pi, off)), -r
+def unwrapped(lines: Array, near: Array) -> tuple[Array, Array]:
+    """Alpha (rad) and r (m) of lines (..., 2) with the alpha next to `near`; r < 0 where it is turned for that."""
+    alpha, r = lines[..., 0], lines[..., 1]
+    off = (alpha - near + np.pi) % (2 * np.pi) - np.pi
+    turned = np.abs(off) > np.pi / 2
+    return near + off - np.where(turned, np.copysign(np.pi, off), 0.0), np.where(turned, -r, r)
+
+
+def told_near(sightings: Array, near: Array) -> Array:
+    """Sightings (..., 2 + 4 n) of lines, alpha, r and n covariances of them, with the alpha next to `near` (rad)."""
+    told = sightings.copy()
+    told[..., 0], told[..., 1] = unwrapped(sightings, near)
+    signs = np.where(told[..., 1:2] < 0, -1.0, 1.0)
+    for covariance_of_both in (3, 4):
+        told[..., covariance_of_both::4] *= signs
+    return told
 
 
 def _pieces(features: Mapping[str, Features]) -> list[dict[str, int]]:
@@ -123,17 +143,20 @@ def _pieces(features: Mapping[str, Features]) -> list[dict[str, int]]:
 
 def _lines(features: Mapping[str, Features], pieces: list[dict[str, int]]) -> Array:
     """(P, 6) alpha, r, start x, y, end x, y of each piece by the first method that has it."""
-    tables = {
-        name: np.column_stack([found.lines.alpha, found.lines.r, found.segments.start, found.segments.end])
-        for name, found in features.items()
-    }
-    owners = (next(iter(piece.items())) for piece in pieces)
+    owners = [next(iter(piece.items())) for piece in pieces]
+    tables = {name: _table(features[name]) for name in {name for name, _ in owners}}
     return np.array([tables[name][i] for name, i in owners]).reshape(-1, 6)
 
 
-def _along(line: Array, alpha: float) -> list[float]:
-    """From where to where (m) along a wall with the normal alpha a piece (6,) goes."""
-    along: list[float] = np.sort(line[2:].reshape(2, 2) @ [-np.sin(alpha), np.cos(alpha)]).tolist()
+def _table(found: Features) -> Array:
+    lines, segments = found.lines, found.segments
+    return np.column_stack([lines.alpha, lines.r, segments.start, segments.end])
+
+
+def _along(lines: Array, alpha: Array) -> Array:
+    """(P, 2) from where to where (m) along walls with the normals alpha (P,) pieces (P, 6) go."""
+    tangents = np.column_stack([-np.sin(alpha), np.cos(alpha)])
+    along: Array = np.sort((lines[:, 2:].reshape(-1, 2, 2) @ tangents[..., None])[..., 0], axis=1)
     return along
 
 

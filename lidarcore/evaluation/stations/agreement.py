@@ -123,8 +123,7 @@ class _Walls:
         """Those matched (N, 2), the second look's laid at T_first_second (3,)."""
         a, b = matches.T
         there, J, F = moved(pair.second.lines[b], pose)
-        lines = zip(*pair.first.lines[a].T.tolist(), there[:, 0].tolist(), strict=True)
-        here = np.array([unwrapped(alpha, r, near) for alpha, r, near in lines]).reshape(-1, 2)
+        here = np.column_stack(unwrapped(pair.first.lines[a], there[:, 0]))
         V = pair.first.covariances[a] + F @ pair.second.covariances[b] @ F.swapaxes(1, 2)
         return cls(here - there, J, V)
 
