@@ -96,7 +96,13 @@ class BackEnd:
         scans = [keyframe.patches for keyframe in self.keyframes]
         sweeps = np.array([keyframe.sweep for keyframe in self.keyframes])
         refined = refine(
-            scans, self.graph.poses, self.steps, self._settings.cell, self._islands.numbers, sweeps
+            scans,
+            self.graph.poses,
+            self.steps,
+            self._settings.cell,
+            self._islands.numbers,
+            sweeps,
+            self._settings.front.match.unevenness,
         )
         self.graph.move(refined.poses)
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]

@@ -183,9 +183,10 @@ class FrontEnd:
             change = max(dt, self._period) * np.array([s.speed_change, s.speed_change, s.turn_change])
             return dt, UncertainPose(self._motion, np.diag(change**2) + _FLOOR)
         motion = relative(odometry, scan.odometry)
-        if (way := float(np.hypot(*motion[:2]))) > s.max_step:
+        if (way := float(np.hypot(*motion[:2]))) > (most := s.max_step * max(dt, 1.0)):
             raise MotionError(
-                f"Odometry jumped by {way:.3g} m: leave the scan out, or raise max_step from {s.max_step:g} m."
+                f"Odometry jumped by {way:.3g} m in {dt:.3g} s, more than {most:.3g} m: leave the scan out, or raise "
+                f"max_step from {s.max_step:g} m."
             )
         return dt, UncertainPose(motion, s.odometry.covariance(motion) + _FLOOR)
 

@@ -81,17 +81,19 @@ def refine(
     size: float,
     islands: Ints | None = None,
     sweeps: Array | None = None,
+    assumed: float = 0.0,
     rounds: int = 12,
 ) -> Refined:
     """Adjust poses (K, 3) that are right to about a cell's `size` m; the first one stays.
 
     islands (K,) number what each pose is right to: surfaces seen from different islands are different ones.
     sweeps (K, 3, 3) are covariances of where each scan stands beside its pose; they move nothing.
+    assumed m is the unevenness that the patches' variances contain: it is measured here, and would count twice.
     steps tie keyframes by odometry or the going on of the motion: what is known where surfaces say nothing.
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
-    seen = _sightings(scans)
+    seen = _sightings(scans, assumed**2)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
         sums, cells = normal_equations(seen, poses, islands, size, scale, unevenness)
@@ -107,9 +109,10 @@ def refine(
     return Refined(poses, sweeps, scale, unevenness, _factor(_with_steps(sums, poses, steps)[0]))
 
 
-def _sightings(scans: list[Patches]) -> Sightings:
+def _sightings(scans: list[Patches], assumed: float) -> Sightings:
+    """All patches, with the variance of noise alone: that of unevenness, m², is taken out."""
     numbers = np.repeat(np.arange(len(scans)), [len(scan.means) for scan in scans])
-    columns = zip(*((scan.means, scan.normals, scan.variances) for scan in scans), strict=True)
+    columns = zip(*((scan.means, scan.normals, scan.variances - assumed) for scan in scans), strict=True)
     return Sightings(numbers, *(np.concatenate(column) for column in columns))
 
 

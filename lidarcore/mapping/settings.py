@@ -72,7 +72,10 @@ class FrontSettings:
         float, number(0.05, 1, "", "share of a scan that must lie on the local map to be tied to it")
     ] = 0.15
     max_step: Annotated[
-        float, number(0.1, 100, "m", "odometry that moves farther between scans has jumped")
+        float,
+        number(
+            0.1, 100, "m", "odometry that moves farther within a second, or from scan to scan, has jumped"
+        ),
     ] = 5.0
 
 

@@ -15,7 +15,7 @@ from lidarcore.localization.dead_reckoning import DeadReckoning
 from lidarcore.localization.deskewing import Distortion
 from lidarcore.localization.ekf.estimate import Instant, no_innovation
 from lidarcore.localization.tracking_result import State, goes_on
-from lidarcore.mapping.background import Background, MapPicture
+from lidarcore.mapping.background import Background, Corrected, MapPicture
 from lidarcore.mapping.front import FrontEnd, Tracked
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.locate_worker import LocateWorker
@@ -58,8 +58,9 @@ class WholeScans:
         self._extraction = extraction = extraction or ExtractionSettings()
         self._settings = MapperSettings().with_noise(extraction.noise)
         self._distortion, self._reckoning = Distortion(), DeadReckoning()
-        self._last: tuple[float, Array] | None = None  # stamp and T_map_sensor
+        self._before: float | None = None  # stamp of the last scan
         self._velocity: Velocity | None = None
+        self._is_nowhere = False  # in a known map, as long as the pose was not found
         self._begin()
 
     @property
@@ -79,10 +80,10 @@ class WholeScans:
 
     def path(self) -> Array:
         """(T, 2) m: where the keyframes were taken, as the map has them now, and the newest scan."""
-        known = self._background.corrected.poses
-        newer = [pose.pose[:2] for pose in self._chain(len(known) - 1, len(self._ways))[1:]]
-        here = [] if self._last is None else [self._last[1][:2]]
-        return np.array([*known[:, :2], *newer, *here])
+        known = self._background.corrected
+        newer = [pose.pose[:2] for pose in self._chain(known)[1:]]
+        here = [] if self._here is None else [self._here.pose[:2]]
+        return np.array([*known.poses[:, :2], *newer, *here])
 
     def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         """Say by hand where the sensor is in a known map: T_map_sensor (3,) m, m, rad and its covariance (3, 3).
@@ -108,11 +109,11 @@ class WholeScans:
             self.end()
             self._begin()
             tracked, message = self._front.step(scan, self._removed(scan)), goes_on(error)
+        self._move(scan, tracked)
         here = self._located(tracked)
-        self._reckon(scan, here.pose)
+        self._reckoning.carry(Instant(scan.stamp, scan.odometry), here.pose)
         state, why = self._background.judge(tracked, here)
         if self._is_nowhere and state != "starting":  # found: odometry is compared from here on
-            self._reckoning.interrupt()
             self._reckoning.place(here.pose)
         self._is_nowhere = state == "starting"
         return self._result(tracked.stamp, state, message or why, here)
@@ -135,8 +136,9 @@ class WholeScans:
         self._background = self._begun()
         self._ways: list[UncertainPose] = []  # to each keyframe from the one before it
         self._tie = _HERE  # T_keyframe_sensor
+        self._here: UncertainPose | None = None
         self._is_nowhere = False
-        self._last = self._velocity = None
+        self._before = self._velocity = None
 
     def _begun(self) -> Background:
         if self._known is not None:
@@ -151,25 +153,23 @@ class WholeScans:
             self._background.put(tracked)
             tie = _HERE
         self._tie = tie
-        known = len(self._background.corrected.poses)
-        return self._chain(known - 1, len(self._ways))[-1].compose(tie)
+        self._here = self._chain(self._background.corrected)[-1].compose(tie)
+        return self._here
 
-    def _chain(self, first: int, end: int) -> list[UncertainPose]:
-        """Poses of keyframes, of which the first is the last that the map has."""
-        known = self._background.corrected
-        poses = [UncertainPose(known.poses[first], known.covariance)]
-        for way in self._ways[first + 1 : end]:
+    def _chain(self, known: Corrected) -> list[UncertainPose]:
+        """Poses of the last keyframe that the map has, and of those since."""
+        poses = [UncertainPose(known.poses[-1], known.covariance)]
+        for way in self._ways[len(known.poses) :]:
             poses.append(poses[-1].compose(way))
         return poses
 
-    def _reckon(self, scan: Scan, pose: Array) -> None:
-        """Remember how the sensor moved: the next scan is deskewed by that."""
+    def _move(self, scan: Scan, tracked: Tracked) -> None:
+        """Remember how the sensor moved, which no bend of the map changes: the next scan is deskewed by that."""
         self._velocity = None
-        if self._last is not None and 0 < (dt := scan.stamp - self._last[0]) <= _PAUSE:
-            x, y, turn = (relative(self._last[1], pose) / dt).tolist()
+        if self._before is not None and 0 < (dt := scan.stamp - self._before) <= _PAUSE:
+            x, y, turn = (relative(self._tie.pose, tracked.tie.pose) / dt).tolist()
             self._velocity = x, turn, y
-        self._last = scan.stamp, pose
-        self._reckoning.carry(Instant(scan.stamp, scan.odometry), pose)
+        self._before = scan.stamp
 
     def _result(self, stamp: float, state: State, message: str | None, here: UncertainPose) -> TrackingResult:
         v, w, u = self._velocity or (0.0, 0.0, 0.0)

@@ -1,6 +1,5 @@
 // The table of the walls of the map.
 
-import { setting } from "./actions.js";
 import { $, el, setText } from "./dom.js";
 import { selectMapped, slant } from "./mapped.js";
 import { selectableRows } from "./rows.js";
@@ -48,6 +47,5 @@ function draw(walls) {
 
 function note(count) {
   if (count > MOST) return `Only the first ${MOST} are shown; saved files and the API have all of them.`;
-  if (count) return "";
-  return setting("navigation.mode") === "slam" ? "No wall is found yet." : "Walls are shown while SLAM builds a map.";
+  return count ? "" : "No wall is found yet.";
 }

@@ -92,7 +92,7 @@ export function mountNavigation() {
   on(["settings", "localization"], ({ navigation }, localization) => {
     const { mode, landmarks } = navigation;
     const wholeScans = isOfScans(navigation, localization);
-    $("map").dataset.of = wholeScans ? "scans" : "landmarks";
+    $("map").dataset.of = !wholeScans ? "landmarks" : mode === "slam" ? "scans" : "grid";
     methodRow.hidden = mode === "localize";
     landmarksRow.hidden = mode !== "localize" || wholeScans;
     motionRow.hidden = wholeScans;

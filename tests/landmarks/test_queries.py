@@ -31,7 +31,7 @@ POINTS = [(30, 40), (33.3, 38.7), (200, 200), (-50, 250), (600, -100)]
 
 @pytest.fixture(scope="module")
 def truth():
-    return RandomLandmarks(100_000)
+    return RandomLandmarks(20_000)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def big_map(truth, tmp_path_factory):
     with Atlas(tmp_path_factory.mktemp("maps") / "big.db") as atlas:
         landmark_map = atlas.begin("big", 0.0)
         assert landmark_map.put(truth.landmarks()) == truth.ids.tolist()
-        atlas.begin("other", 0.0).put(RandomLandmarks(10_000, seed=1).landmarks())
+        atlas.begin("other", 0.0).put(RandomLandmarks(4_000, seed=1).landmarks())
         yield landmark_map
 
 

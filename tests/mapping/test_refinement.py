@@ -100,3 +100,20 @@ def test_relative_poses_are_as_far_off_as_they_claim(world, poses):
     low, high = (chi2.ppf(p, 3 * len(nees)) / len(nees) for p in (5e-7, 1 - 5e-7))
     for column in nees.T:
         assert 0.85 * low < column.mean() < 1.15 * high
+
+
+def test_unevenness_that_patches_assume_does_not_count_twice():
+    """It is measured here: what a match assumed of it changes nothing."""
+    poses = np.array([[0.3 * k, 0.1, 0.05 * k] for k in range(5)])
+    assumed = 0.005
+    found = []
+    for unevenness in (0.0, assumed):
+        rng, match = np.random.default_rng(3), MatchSettings(noise=NOISE, unevenness=unevenness)
+        scans = [patches(full_scan(furnished_room(), pose, NOISE, rng), match) for pose in poses]
+        start = relative(poses[0], poses)
+        steps = [Step(k, k + 1, relative(poses[k], poses[k + 1]), VAGUE) for k in range(4)]
+        found.append(refine(scans, start, steps, 0.5, assumed=unevenness))
+    bare, uneven = found
+    np.testing.assert_allclose(uneven.poses, bare.poses, atol=1e-9)
+    np.testing.assert_allclose(uneven.covariance(4), bare.covariance(4), rtol=1e-6)
+    assert uneven.unevenness == pytest.approx(bare.unevenness)

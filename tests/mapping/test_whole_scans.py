@@ -55,3 +55,20 @@ def test_a_robot_that_drives_through_two_rooms_is_tracked_all_the_way(
     print(error, np.sqrt(np.diag(last.covariance)))
     assert np.hypot(*error[:2]) < 0.1
     assert error @ np.linalg.solve(last.covariance, error) < chi2.isf(1e-6, 3)
+
+
+def test_the_map_goes_on_after_a_pause_in_which_the_robot_drove_on(
+    slam: WholeScans, drive: list[Scan]
+) -> None:
+    """Nobody looked for 14 s and 7 m; wheels tell of the way."""
+    before, after = drive[:150], drive[290:330]
+    way = relative(true_pose(drive, 149), true_pose(drive, 290))
+    assert before[-1].odometry is not None
+    assert after[0].odometry is not None
+    driven = relative(before[-1].odometry, after[0].odometry)
+    print(way, driven)
+    followed(slam, before)
+    last = followed(slam, after)[-1]
+    assert last.state == "tracking"
+    assert len(slam.path()) > 10  # not a map that has just begun
+    assert np.hypot(*(last.estimate.pose - true_pose(drive, 329))[:2]) < 0.3
