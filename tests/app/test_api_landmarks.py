@@ -258,6 +258,7 @@ def test_sessions_are_listed_cleared_and_deleted(maps: Maps) -> None:
     assert listed["sessions"][-1] == {
         "id": passing.session, "source": "passing", "mode": "slam", "started": 1.0, "ended": None, "landmarks": 4,
         "walls": 0,
+        "grid": False,
     }  # fmt: skip
     assert listed["store"]["error"] is None
     assert maps.server.http.delete("/landmarks", params={"session": passing.session}).status_code == 204
