@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
+from threading import Lock
 from typing import Generic, TypeVar
 
 from lidarcore import LidarError
@@ -31,7 +32,7 @@ class Isolated(Generic[Item]):
         self, name: str, error: type[LidarError], function: Callable[..., Iterator[Item]], *arguments: object
     ) -> None:
         """`name` is of the file, for the messages; function and arguments must be picklable."""
-        self._name, self._error = name, error
+        self._name, self._error, self._lock = name, error, Lock()
         self._connection, sending = _processes.Pipe(duplex=False)
         self._process = _processes.Process(target=_work, args=(sending, function, arguments), daemon=True)
         self._process.start()
@@ -59,10 +60,11 @@ class Isolated(Generic[Item]):
         self._process.kill()
 
     def close(self) -> None:
-        """End the process, and give up what connects to it."""
+        """End the process, and give up what connects to it. Any thread may call this."""
         self.kill()
         self._process.join(END_WITHIN)
-        self._connection.close()
+        with self._lock:  # closed twice at a time, it would close what has its number since
+            self._connection.close()
 
     def _stopped(self, why: str) -> LidarError:
         self.close()

@@ -189,7 +189,7 @@ def test_the_trash_keeps_what_was_deleted_last_and_empties_itself(tmp_path: Path
     trash.take_back(file)
     assert file.read_text() == "new"
     wait_until(lambda: [path.name for path in tmp_path.iterdir()] == ["room.npz"])
-    with pytest.raises(NotFoundError, match=r"kept for 0\.5 s"):
+    with pytest.raises(NotFoundError, match=r"kept for only 0\.5 s"):
         trash.take_back(file)
 
 

@@ -318,6 +318,7 @@ def environment() -> dict[str, str]:
 BUSY = 2.0  # s that a machine may be late by
 
 
+@pytest.mark.long
 def test_no_landmark_confirmed_a_second_ago_is_lost_when_the_process_is_killed(tmp_path: Path) -> None:
     path = tmp_path / "landmarks.db"
     command = [sys.executable, "-c", RUN, str(path)]

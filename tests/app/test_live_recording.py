@@ -181,7 +181,10 @@ def test_what_cannot_be_played_does_not_end_it(watching: Server) -> None:
 
 
 def test_a_recording_that_plays_is_not_recorded(server: Server) -> None:
-    assert "A recording plays" in assert_problem(server.http.post("/recorder/start", json={}), 409)["detail"]
+    assert (
+        "A recording is playing"
+        in assert_problem(server.http.post("/recorder/start", json={}), 409)["detail"]
+    )
     assert server.get("/recorder")["state"] == stop(server)["state"] == "idle"
     assert list(server.folder.iterdir()) == []
 

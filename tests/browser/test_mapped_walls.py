@@ -137,6 +137,7 @@ def test_a_click_tells_all_of_a_wall_and_what_it_was(look: Callable[..., Visitor
     assert len(told) > 1
 
 
+@pytest.mark.long
 def test_walls_of_map_and_scan_lead_to_each_other_and_keys_step_through_those_of_the_map(
     look: Callable[..., Visitor], mapped: Server
 ) -> None:

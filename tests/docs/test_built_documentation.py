@@ -85,6 +85,7 @@ def test_every_link_leads_somewhere(pages: dict[Path, Page]) -> None:
     assert not dead
 
 
+@pytest.mark.long
 def test_nothing_is_loaded_from_elsewhere(built: Path, pages: dict[Path, Page]) -> None:
     for path, page in pages.items():
         assert not [url for url in page.loads if urlsplit(url).netloc], path
@@ -93,6 +94,7 @@ def test_nothing_is_loaded_from_elsewhere(built: Path, pages: dict[Path, Page]) 
         assert not re.findall(r"(?:url\(|@import)\s*['\"]?(?:https?:)?//", sheet.read_text("utf-8")), sheet
 
 
+@pytest.mark.long
 def test_every_public_class_and_function_is_described(pages: dict[Path, Page]) -> None:
     """Of the packages that say what is public; what several offer is described in one of them."""
     names = [m.name for m in pkgutil.iter_modules(lidarcore.__path__, "lidarcore.") if m.ispkg]
@@ -104,6 +106,7 @@ def test_every_public_class_and_function_is_described(pages: dict[Path, Page]) -
     assert not [name for name, value in public.items() if isinstance(value, kinds) and name not in described]
 
 
+@pytest.mark.long
 def test_every_term_of_the_glossary_is_there(pages: dict[Path, Page]) -> None:
     (glossary,) = (page for path, page in pages.items() if path.name == "glossary.html")
     for term in ("scan", "beam", "segment", "wall", "corner", "landmark", "coverage", "ANEES", "NIS", "gate"):

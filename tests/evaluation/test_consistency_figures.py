@@ -60,6 +60,7 @@ def coverages(inside):
     return {f"coverage_{100 * level:.0f}": inside(chi2.ppf(level, 2)) for level in LEVELS}
 
 
+@pytest.mark.long
 def test_an_honest_method_is_found_honest(blocks):
     figures = judge(blocks)
     assert_caught(

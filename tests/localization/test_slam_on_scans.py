@@ -81,6 +81,7 @@ def test_no_more_poses_are_outside_of_their_ellipsoids_than_chance_puts_there(
     assert squared.mean() <= chi2.isf(RARE, 3 * draws) / draws
 
 
+@pytest.mark.long
 def test_the_ellipsoids_are_no_larger_than_the_noise_that_was_told_makes_them(
     runs: tuple[Array, Array, Array],
 ) -> None:
