@@ -1,4 +1,5 @@
 import http.client
+import os
 import pickle
 import socket
 from collections.abc import Callable
@@ -19,8 +20,11 @@ BAD_NAMES = [
 
 
 def files(folder: Path) -> list[str]:
-    """Everything below the folder's parent: what was written, wherever it went."""
-    return sorted(str(path.relative_to(folder.parent)) for path in folder.parent.rglob("*"))
+    """Everything below the folder's parent: what was written, wherever it went; files may vanish meanwhile."""
+    found = (
+        Path(where) / name for where, folders, names in os.walk(folder.parent) for name in (*folders, *names)
+    )
+    return sorted(str(path.relative_to(folder.parent)) for path in found)
 
 
 def test_an_uploaded_recording_is_listed_plays_and_can_be_deleted(server: Server, tmp_path: Path) -> None:
