@@ -8,7 +8,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import UncertainPose, compose
+from lidarcore.geometry import UncertainPose, compose, largest_variance
 from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.background import END_WITHIN, Corrected, MapPicture
 from lidarcore.mapping.front import Tracked
@@ -26,7 +26,7 @@ _NOWHERE = UncertainPose(np.zeros(3), np.diag([10.0, 10.0, np.pi]) ** 2)
 
 _CONFIRMED = 1.0  # m of way after which a pose that was found is believed
 
-_ONCE = "One place of the map fits what is seen; it is believed once it still fits a metre further on."
+_ONCE = "One place of the map fits what is seen: drive a metre on to confirm it, or set the pose there."
 _NOT_SEEN = "What is seen does not lie on the map here: the pose is predicted by motion alone."
 _WHY_NOT: dict[Verdict, str] = {
     "too few points": "Too little is in view to find the pose in the map: drive on, or set the pose.",
@@ -157,7 +157,7 @@ class LocateWorker:
             return
         self._verdict = "coasting", _NOT_SEEN
         self._misses += near.against > relocator.settings.against
-        spread = np.sqrt(np.linalg.eigvalsh(self._here.covariance[:2, :2])[-1])
+        spread = np.sqrt(largest_variance(self._here.covariance[:2, :2]))
         if self._misses >= _MISSES or spread > _LOST or self._here.covariance[2, 2] > VAGUE**2:
             self._lose()
 
