@@ -44,7 +44,7 @@ class Isolated(Generic[Item]):
     def __next__(self) -> Item:
         try:
             if not self._connection.poll(QUIET):
-                raise self._stopped(f"nothing could be read of it for {QUIET:g} s")
+                raise self._stopped(f"nothing could be read from it for {QUIET:g} s")
             item, error, is_over = self._connection.recv()
         except (EOFError, OSError) as gone:  # the latter also if it was closed by another thread
             raise self._stopped("the process that read it died") from gone

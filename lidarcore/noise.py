@@ -93,7 +93,7 @@ class SensorNoise:
     renewal: Annotated[
         Share,
         Field(
-            description="share of the unevenness that is another one in the next scan from the same place: 1 if "
+            description="share of the unevenness that changes from scan to scan at the same place: 1 if "
             "nothing of it repeats, 0 if all of it does. More: a standing sensor's corners scatter more"
         ),
     ] = 1.0

@@ -19,7 +19,9 @@ def agreement(
     given: Annotated[
         bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
     ] = False,
-    by_pair: Annotated[bool, typer.Option("--by-pair", help="a line for each pair of stations, too")] = False,
+    by_pair: Annotated[
+        bool, typer.Option("--by-pair", help="also print a line for each pair of stations")
+    ] = False,
     topic: Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FILE.json with the figures of every pair")

@@ -26,17 +26,17 @@ def calibrate(
     recording: RecordingPath,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="FILE.json for the noise, to be given to others as --settings"),
+        typer.Option(
+            "-o", "--output", help="FILE.json for the noise; other commands read it with --settings"
+        ),
     ] = None,
-    skip: Annotated[int, typer.Option(min=0, help="scans to leave out at the beginning")] = 0,
+    skip: Annotated[int, typer.Option(min=0, help="scans to skip at the beginning")] = 0,
     scans: Annotated[
         int | None, typer.Option(min=1, help="scans to take, 100 suffice; all if not given")
     ] = None,
     topic: Topic = None,
     settings: SettingsFile = None,
-    json: Annotated[
-        bool, typer.Option("--json", help="all of it as JSON instead of a table, m and rad")
-    ] = False,
+    json: Annotated[bool, typer.Option("--json", help="print JSON (m and rad) instead of a table")] = False,
 ) -> None:
     """Measure the noise of a sensor from a recording in which it stands still in a room.
 

@@ -17,7 +17,10 @@ Without a sensor, lidarcore serve takes an emulated one."""
 
 def devices(
     ask: Annotated[
-        bool, typer.Option(help="ask what looks like an RPLIDAR; stops one that was left turning")
+        bool,
+        typer.Option(
+            help="query every port that looks like an RPLIDAR; this stops one that was left turning"
+        ),
     ] = True,
     as_json: Annotated[bool, typer.Option("--json", help="print JSON, for programs")] = False,
 ) -> None:

@@ -49,7 +49,7 @@ Noises = Annotated[
     ),
 ]
 Segments = Annotated[
-    str, typer.Option(help="which segments: known, found (by the real segmentation), or both")
+    str, typer.Option(help="segments to use: known, found (by the real segmentation), or both")
 ]
 Trials = Annotated[
     int,
@@ -80,7 +80,7 @@ def consistency(
     workers: Workers = None,
     scheduler: Scheduler = None,
     output: StudyOutput = None,
-    by_room: Annotated[bool, typer.Option("--by-room", help="a table for each room, too")] = False,
+    by_room: Annotated[bool, typer.Option("--by-room", help="also print a table for each room")] = False,
     for_programs: ForPrograms = False,
 ) -> None:
     """Bias, RMS error, coverage, ANEES and ellipse areas of every fitter with both covariances."""
@@ -138,7 +138,7 @@ def _console() -> "Console":
 def repeatability(
     recording: RecordingPath,
     scans: Annotated[int, typer.Option(min=10, help="scans to read and judge together")] = 100,
-    skip: Annotated[int, typer.Option(min=0, help="scans to leave out at the beginning")] = 0,
+    skip: Annotated[int, typer.Option(min=0, help="scans to skip at the beginning")] = 0,
     methods: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="fitters to compare; all if not given")
     ] = None,

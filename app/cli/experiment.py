@@ -30,7 +30,7 @@ def begin() -> None:
 Output = Annotated[
     Path, typer.Option("-o", "--output", help="FILE.html for the report; replaced if it exists")
 ]
-Quick = Annotated[bool, typer.Option("--quick", help="100 scans of each room only, to try it out")]
+Quick = Annotated[bool, typer.Option("--quick", help="only 100 scans of each room, to try it out")]
 Recording = Annotated[
     Path | None,
     typer.Option(help="a recording of a sensor at rest, in place of the simulated rooms", exists=True),
@@ -116,7 +116,7 @@ def clustering_ekf(
     runs: Annotated[
         int | None, typer.Option(min=1, help="drives along each trajectory; 20 if not given, 2 with --quick")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="one scan a second only, to try it out")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="only one scan a second, to try it out")] = False,
     workers: Workers = None,
     for_programs: ForPrograms = False,
 ) -> None:

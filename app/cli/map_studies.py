@@ -15,7 +15,7 @@ def relocation(
     recording: RecordingPath,
     other: Annotated[
         list[Path] | None,
-        typer.Option(help="a recording of another place, none of which may be found; may be repeated"),
+        typer.Option(help="a recording of another place, where no pose may be found; may be repeated"),
     ] = None,
     topic: Topic = None,
 ) -> None:

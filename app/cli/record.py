@@ -35,7 +35,7 @@ def record(
         float | None,
         typer.Option(min=0.1, help="how long, in s from the first scan on; until Ctrl-C if not given"),
     ] = None,
-    raw: Annotated[Path | None, typer.Option(help="a file for the bytes of the port, too")] = None,
+    raw: Annotated[Path | None, typer.Option(help="also write the port's raw bytes to this file")] = None,
     settings: SettingsFile = None,
     set_: Set = None,
 ) -> None:

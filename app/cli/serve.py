@@ -10,7 +10,10 @@ import typer
 from .options import Set, SettingsFile, Topic, settings_from
 
 Recording = Annotated[
-    Path | None, typer.Argument(help="play this; if not given, the sensor connected, else an emulated one")
+    Path | None,
+    typer.Argument(
+        help="recording to play; if not given, the connected sensor, or an emulated one if there is none"
+    ),
 ]
 Host = Annotated[str, typer.Option(help="address to listen on; a token is needed unless it is local")]
 HttpPort = Annotated[int, typer.Option(min=0, max=65535, help="port of the dashboard; 0 takes any free one")]
@@ -25,7 +28,7 @@ Mode = Annotated[
     str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")
 ]
 Rpm = Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")]
-Emulator = Annotated[bool, typer.Option("--emulator", help="an emulated sensor, whatever is connected")]
+Emulator = Annotated[bool, typer.Option("--emulator", help="use an emulated sensor, whatever is connected")]
 Recordings = Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")]
 MapFile = Annotated[
     str | None,
@@ -37,10 +40,14 @@ MapFile = Annotated[
 ]
 MaxUpload = Annotated[int, typer.Option(min=1, help="largest upload, MB")]
 Token = Annotated[
-    str | None, typer.Option(envvar="LIDARCORE_TOKEN", help="token to demand; random if needed")
+    str | None,
+    typer.Option(
+        envvar="LIDARCORE_TOKEN",
+        help="token that requests must carry; a random one is made where one is needed",
+    ),
 ]
-AllowHost = Annotated[list[str] | None, typer.Option(help="a further name this server is reached by")]
-OpenBrowser = Annotated[bool, typer.Option("--open-browser", help="open the page")]
+AllowHost = Annotated[list[str] | None, typer.Option(help="another name by which this server is reached")]
+OpenBrowser = Annotated[bool, typer.Option("--open-browser", help="open the page in the browser")]
 
 
 def serve(

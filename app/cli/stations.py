@@ -23,7 +23,9 @@ def stations(
     given: Annotated[
         bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
     ] = False,
-    by_station: Annotated[bool, typer.Option("--by-station", help="a table for each station, too")] = False,
+    by_station: Annotated[
+        bool, typer.Option("--by-station", help="also print a table for each station")
+    ] = False,
     topic: Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")] = None,
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="FILE.json with the figures of every station")

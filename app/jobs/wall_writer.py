@@ -39,8 +39,7 @@ class WallWriter:
         if self._map is None:
             self._map = self._atlas.begin(self._source, self._started, self._mode)
         try:
-            self._map.put_walls(confirmed)
-            self._map.put_grid(grid_to_stored(grid))
+            self._map.put_walls(confirmed, grid_to_stored(grid))
         except UnknownSessionError:
             self._map = self._written = None
             raise

@@ -78,7 +78,7 @@ class Guard:
         if origin is None or connection.scope.get("method") in SAFE_METHODS:
             return
         if _netloc(origin) != connection.headers["host"]:
-            raise ProblemError(403, f"Pages of {origin!r} may not change or watch anything here.")
+            raise ProblemError(403, f"Pages from {origin!r} may neither change nor watch anything here.")
 
     def _sign_in(self, connection: HTTPConnection) -> Response | None:
         """The right token in the address becomes a cookie, and leaves the address."""

@@ -18,6 +18,7 @@ from .routes import (
     calibration,
     clusters,
     frame,
+    grid,
     landmarks,
     localization,
     map,
@@ -39,7 +40,7 @@ from .state import ServerOptions, State
 
 API = "/api/v1"
 ROUTES = (
-    frame, clusters, measure, localization, walls, landmarks, map, sessions, repeatability, calibration, studies,
+    frame, clusters, measure, localization, walls, grid, landmarks, map, sessions, repeatability, calibration, studies,
     settings, source, sensor, recordings, recorder, selection, meta,
 )  # fmt: skip
 PAGES = {"/": "index.html", "/studies": "studies.html", "/guide": "guide.html", "/docs": "docs.html"}

@@ -177,7 +177,7 @@ def lines(stream: IO[bytes], remark: Callable[[str], None]) -> Iterator[bytes]:
             yield line
         elif len(line) == MAX_LINE:
             raise RecordingError(
-                f"A line is longer than {MAX_LINE // MEBIBYTE} MiB: this is no text recording."
+                f"A line is longer than {MAX_LINE // MEBIBYTE} MiB: this is not a text recording."
             )
         else:
             remark("The last line does not end: left out.")

@@ -186,7 +186,7 @@ class Database:
             (unit,) = connection.execute("SELECT unit FROM about").fetchone()
             if unit != UNIT:
                 raise LandmarkMapError(
-                    f"{self.path} is in {unit!r}, not in metres: convert it before it is opened."
+                    f"{self.path} is in {unit!r}, not in metres: convert it before opening it."
                 )
         with self._explained():
             self._writer.execute("PRAGMA journal_mode = WAL")
@@ -238,7 +238,7 @@ def path_of(url: str | Path) -> Path:
     if text.startswith("sqlite:///"):
         text = text.removeprefix("sqlite:///")
     if "://" in text or text in ("", ":memory:"):
-        raise LandmarkMapError(f"{url} is no file for a landmark map: give a path, or sqlite:///path.")
+        raise LandmarkMapError(f"{url} cannot be the file of a landmark map: give a path, or sqlite:///path.")
     path = Path(text)
     if "\0" in text or not path.parent.is_dir() or path.is_dir():
         raise LandmarkMapError(f"{path} cannot be a landmark map: give a file in a folder that exists.")

@@ -73,7 +73,9 @@ def read_landmarks(file: TextIO, name: str) -> Iterator[Landmark]:
     with _explained(f"This {name}"):
         for number, row in enumerate(FORMATS[name].read(file), 1):
             if wrong := (_REQUIRED - set(row)) | (set(row) - set(COLUMNS)):
-                raise MapFileError(f"Landmark {number} lacks or has beyond need: {', '.join(sorted(wrong))}.")
+                raise MapFileError(
+                    f"Landmark {number} has missing or unknown fields: {', '.join(sorted(wrong))}."
+                )
             try:
                 yield Landmark(**row)
             except LandmarkError as error:
@@ -91,7 +93,7 @@ def _read_csv(file: TextIO) -> Iterator[Row]:
     header = next(reader, [])
     names = {csv_name: name for name, csv_name in _CSV_NAMES.items()}
     if unknown := [name for name in header or [""] if name not in names]:
-        raise MapFileError(f"Columns {unknown} are none of {list(names)}: name and convert them so.")
+        raise MapFileError(f"Columns {unknown} are unknown: rename and convert them to {list(names)}.")
     for values in filter(None, reader):  # without blank lines
         if len(values) != len(header):
             raise MapFileError(
@@ -161,7 +163,9 @@ def _items(file: TextIO, key: str) -> Iterator[Row]:
     reader, head = JsonReader(file), Row()
     if reader.next() != "{":
         reader.value()
-        raise MapFileError(f"This holds no object with {key}: export a map to see what is expected.")
+        raise MapFileError(
+            f"The file holds no object with the key {key}: export a map to see what is expected."
+        )
     is_there = False
     for name in reader.members():
         if name == key:
@@ -171,24 +175,26 @@ def _items(file: TextIO, key: str) -> Iterator[Row]:
         elif (value := reader.value()) is not None and name in _HEADER:
             head[name] = value
     if reader.next():
-        raise MapFileError("There is more after the end of the object: export the map anew.")
+        raise MapFileError("There is more text after the end of the object: export the map again.")
     _check_head(head, _HEADER)
     if not is_there:
-        raise MapFileError(f"{key} is no list of objects.")
+        raise MapFileError(f"{key} is not a list of objects.")
 
 
 def _objects(reader: JsonReader, key: str) -> Iterator[Row]:
     items = reader.items() if reader.next() == "[" else [None]
     for item in items:
         if not isinstance(item, dict):
-            raise MapFileError(f"{key} is no list of objects.")
+            raise MapFileError(f"{key} is not a list of objects.")
         yield item
 
 
 def _check_head(head: Row, expected: Row) -> None:
     if head != expected:
         says = {name: head.get(name) for name in _HEADER}
-        raise MapFileError(f"This says {says}, expected is {_HEADER}: convert it, or update lidarcore.")
+        raise MapFileError(
+            f"The header is {says} where {_HEADER} is expected: convert the file, or update lidarcore."
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,11 +93,16 @@ class LandmarkMap:
                 self._remove(connection, id)
             return self.store(connection, landmarks)
 
-    def put_walls(self, walls: Iterable[StoredWall]) -> None:
-        """Store walls in place of those that the map has, all or none. Raises UnknownSessionError if it was deleted."""
+    def put_walls(self, walls: Iterable[StoredWall], grid: StoredGrid | None = None) -> None:
+        """Store walls, and the grid of the same moment, in place of those that the map has: all or nothing.
+
+        Raises UnknownSessionError if it was deleted.
+        """
         with self._database.writing() as connection:
             self._check(connection)
             replace_walls(connection, self.session, walls)
+            if grid is not None:
+                self._replace_grid(connection, grid)
 
     def walls(self) -> list[StoredWall]:
         """All walls in the order of their ids."""
@@ -121,8 +126,11 @@ class LandmarkMap:
         """Store an occupancy grid in place of that which the map has. Raises UnknownSessionError if it was deleted."""
         with self._database.writing() as connection:
             self._check(connection)
-            query = f"INSERT OR REPLACE INTO grids (session, {_GRID}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
-            connection.execute(query, (self.session, *astuple(grid)))
+            self._replace_grid(connection, grid)
+
+    def _replace_grid(self, connection: sqlite3.Connection, grid: StoredGrid) -> None:
+        query = f"INSERT OR REPLACE INTO grids (session, {_GRID}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+        connection.execute(query, (self.session, *astuple(grid)))
 
     def grid(self) -> StoredGrid | None:
         """The occupancy grid, if there is one."""

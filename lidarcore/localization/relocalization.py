@@ -30,7 +30,7 @@ _ROUNDS = 4
 _MOST_PAIRS = 4_000_000  # of landmarks, within the longest distance seen
 _MOST_POSES = 50_000  # hypotheses that are compared with the whole scan
 _MOST_REFINED = 100  # hypotheses, the best ones, of which least squares are worth it
-_TOO_LARGE = "The map of {} landmarks is too large to be searched at once: say where the sensor is."
+_TOO_LARGE = "A map of {} landmarks is too large to search without a guess: say where the sensor is."
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,7 +25,7 @@ class OdometryNoise:
             1,
             "m/√m",
             "standard deviation ahead after one metre. "
-            "More: scans correct the way that odometry reports by more",
+            "More: scans correct the distance that odometry reports by more",
         ),
     ] = 0.03
     across: Annotated[
@@ -44,7 +44,7 @@ class OdometryNoise:
             1,
             "rad/√m",
             "standard deviation of the heading after one metre. "
-            "More: scans correct the heading on straight ways by more",
+            "More: scans correct the heading on straight stretches by more",
         ),
     ] = 0.02
     heading_per_radian: Annotated[
@@ -191,7 +191,7 @@ class LocalizationSettings:
             0.999999999,
             "",
             "a new landmark lies outside this gate of every known one. "
-            "More: fewer landmarks twice, and of those close together fewer at all",
+            "More: fewer landmarks are mapped twice, and fewer of those that are close together at all",
         ),
     ] = 0.99999
     ambiguity: Annotated[
@@ -262,7 +262,7 @@ class NavigationSettings:
         Field(description="localize in a map that is given, or build it at the same time"),
     ] = "off"
     landmarks: Annotated[
-        Literal["corners", "clusters"], Field(description="what of a scan is taken for landmarks")
+        Literal["corners", "clusters"], Field(description="what in a scan serves as landmarks")
     ] = "corners"
     motion: Annotated[
         Literal["auto", "odometry", "constant velocity"],
@@ -274,7 +274,7 @@ class NavigationSettings:
             0.01,
             10,
             "m",
-            "wider clusters are no landmarks: the mean of a wall depends on how much of it is in view. "
+            "wider clusters are not landmarks: the mean of a wall depends on how much of it is in view. "
             "More: larger things are landmarks, too",
         ),
     ] = 0.5

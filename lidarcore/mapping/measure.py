@@ -43,7 +43,7 @@ def feature(name: str) -> Feature:
         return Feature("wall", int(number))
     if kind == "corner" and number.isdecimal():
         return Feature("corner", int(number))
-    raise MeasureError(f"{name!r} is no feature: give wall-N or corner-N.")
+    raise MeasureError(f"{name!r} does not name a feature: give wall-N or corner-N.")
 
 
 def distance(walls: Walls, first: Feature, second: Feature) -> Measurement:
@@ -58,7 +58,7 @@ def distance(walls: Walls, first: Feature, second: Feature) -> Measurement:
 def angle(walls: Walls, first: Feature, second: Feature) -> Measurement:
     """Between the lines of two walls, from 0 to pi/2. Raises MeasureError if one of them is a corner or unknown."""
     if first.kind != "wall" or second.kind != "wall":
-        raise MeasureError("Only walls have directions: give two walls for an angle.")
+        raise MeasureError("Only walls have a direction: give two walls to measure an angle.")
     return _measured(walls, first, second, angle_of)
 
 
@@ -70,7 +70,7 @@ def length(walls: Walls, id: int) -> Measurement:
 
 def _measured(walls: Walls, first: Feature, second: Feature, f: _Function) -> Measurement:
     if first == second:
-        raise MeasureError("Both features are the same: give two.")
+        raise MeasureError("Both features are the same: give two different ones.")
     points = np.concatenate([_points(walls, one) for one in (first, second)])
     split = len(_points(walls, first))
     rows = csr_array(vstack([_rows(walls, one) for one in (first, second)]))

@@ -129,7 +129,9 @@ class PoseGraph:
         parts, part = connected_components(edges, directed=False)
         if parts > 1:
             loose = int(np.flatnonzero(part != part[0])[0])
-            raise LocalizationError(f"No way leads from node 0 to node {loose}: connect every node first.")
+            raise LocalizationError(
+                f"No path of edges leads from node 0 to node {loose}: connect every node first."
+            )
 
     def _heat(self) -> float:
         """How much later than usual doubts about new edges must begin for all of them to count.

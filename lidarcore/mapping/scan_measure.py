@@ -26,7 +26,7 @@ def distance(features: Features, first: Feature, second: Feature) -> Measurement
 def angle(features: Features, first: Feature, second: Feature) -> Measurement:
     """Between the lines of two walls, 0 to pi/2. Raises MeasureError if one of them is a corner or unknown."""
     if first.kind != "wall" or second.kind != "wall":
-        raise MeasureError("Only walls have directions: give two walls for an angle.")
+        raise MeasureError("Only walls have a direction: give two walls to measure an angle.")
     return _measured(features, first, second, angle_of)
 
 
@@ -34,7 +34,7 @@ def _measured(
     features: Features, first: Feature, second: Feature, f: Callable[[Array, Array], float]
 ) -> Measurement:
     if first == second:
-        raise MeasureError("Both features are the same: give two.")
+        raise MeasureError("Both features are the same: give two different ones.")
     lines = np.stack([features.lines.alpha, features.lines.r], 1)
     a, b = (_points_of(features, one) for one in (first, second))
 

@@ -76,7 +76,7 @@ def open_recording(
     if path.is_dir():
         raise RecordingError(f"The directory {path.name} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
     known = ", ".join(format_.name for format_ in FORMATS)
-    raise RecordingError(f"{path.name} is none of the known formats: {known}.")
+    raise RecordingError(f"{path.name} is in none of the known formats: {known}.")
 
 
 def _head(path: Path) -> bytes:

@@ -191,7 +191,7 @@ class Driver:
             if (baud := find_other_baud(path, self.baud, self._closing)) is None:
                 raise
             raise NoAnswerError(
-                f"The sensor at {path} talks at {baud} baud, not at {self.baud}: choose that rate."
+                f"The sensor at {path} uses {baud} baud, not {self.baud}: choose that rate."
             ) from error
 
     def _connect(self, path: str) -> Session:

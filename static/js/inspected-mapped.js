@@ -71,7 +71,7 @@ async function askHistory() {
   const wall = selectedMapped();
   if (!wall || get("wallHistory").at(-1)?.last_seen === wall.last_seen) return;
   const query = `walls/${wall.id}/history?limit=1000&after=${wall.last_seen - LONGEST_S}`;
-  const found = await request("GET", query).catch(() => null); // it begins once the wall was seen often enough
+  const found = await request("GET", query).catch(() => null); // the wall may have become part of another
   if (found && get("mappedWall") === wall.id) set("wallHistory", found.history);
 }
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from processes import Serving
 from sensing import watch
-from serving import SINCE, Server, write_room
+from serving import ROBOT, SINCE, Server, write_room
 from waiting import free_port
 
 from lidarcore.rplidar.emulator_process import EmulatorProcess
@@ -58,6 +58,14 @@ def make_server(folder: Path, background: Path) -> Iterator[Callable[..., Server
 @pytest.fixture
 def server(make_server: Callable[..., Server]) -> Server:
     return make_server()
+
+
+@pytest.fixture
+def driving(make_server: Callable[..., Server]) -> Server:
+    """Plays a simulated robot that drives through two rooms."""
+    server = make_server()
+    server.change("PUT", "/source", ROBOT)
+    return server
 
 
 @pytest.fixture(scope="module")

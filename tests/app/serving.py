@@ -27,6 +27,7 @@ from lidarcore import open_recording
 ROOT = Path(__file__).parents[2]
 CORNERS = np.array([[3.5, 2.2], [-2.5, 2.2], [-2.5, -1.8], [3.5, -1.8]])  # m, in the sensor frame
 SINCE = 1e9  # s: stamp of the first scan of what a server plays until it is told what to play
+ROBOT = {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}}
 Json = dict[str, Any]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import chi2
-from serving import Json, Server, assert_problem, chosen, wait_until
+from serving import ROBOT, Json, Server, assert_problem, chosen, wait_until
 
 from lidarcore.geometry import wrap
 from lidarcore.simulation.routes import Limits
@@ -23,7 +23,7 @@ def driving(tmp_path_factory: pytest.TempPathFactory, background: Path) -> Itera
     """A server that maps two rooms through which a robot drives."""
     server = Server(tmp_path_factory.mktemp("driving") / "recordings", recording=background)
     server.change("PATCH", "/settings", SLAM)
-    server.change("PUT", "/source", {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}})
+    server.change("PUT", "/source", ROBOT)
     yield server
     server.stop()
 

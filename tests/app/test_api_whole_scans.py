@@ -1,13 +1,13 @@
 """SLAM from whole scans on a real server that plays a simulated robot: pose, grid and walls over REST."""
 
 import io
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from lidarcore_app.jobs.wall_writer import CONFIRMED
 from PIL import Image
 from serving import Server, assert_problem, wait_until
 
@@ -15,15 +15,6 @@ from lidarcore.mapping.grid import read_ros_map, shades_of
 
 WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
 LANDMARKS = {"navigation": {"mode": "slam", "method": "landmarks"}}
-ROBOT = {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}}
-
-
-@pytest.fixture
-def driving(tmp_path: Path, background: Path) -> Iterator[Server]:
-    server = Server(tmp_path / "recordings", recording=background)
-    server.change("PUT", "/source", ROBOT)
-    yield server
-    server.stop()
 
 
 def free_area(server: Server) -> float:
@@ -91,6 +82,14 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
         middle = np.add(first["start"], first["end"]) / 2
         assert way @ way_then > 0.9
         assert abs(np.subtract(middle, then["start"]) @ [-way_then[1], way_then[0]]) < 0.3
+
+    driving.change("PATCH", "/source", {"state": "paused"})
+    wait_until(lambda: driving.get("/sessions")["store"]["behind_s"] == 0, "the walls are kept")
+    told = [driving.get(f"/walls/{wall['id']}/history") for wall in driving.get("/walls")["walls"]]
+    assert any(of["history"] for of in told)
+    # A wall that too few keyframes saw is in the map, but nothing of it is kept.
+    assert all(of["history"] or of["wall"]["count"] < CONFIRMED for of in told)
+    driving.change("PATCH", "/source", {"state": "playing"})
 
     before = driving.next_frame()
     where = before["localization"]

@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -23,7 +23,7 @@ from lidarcore.simulation.settings import SimulationSettings
 
 FRAME = np.array([20.0, -5.0, 2.5])
 """T_map_world: maps have frames of their own."""
-ROBOT = {"kind": "simulation", "settings": {"world": "furnished room", "seed": 4}}
+FURNISHED = {"kind": "simulation", "settings": {"world": "furnished room", "seed": 4}}
 LOCALIZE = {"navigation": {"mode": "localize"}}
 YAML = (
     "image: {}\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
@@ -63,11 +63,11 @@ def packed(*files: tuple[str, bytes]) -> bytes:
 
 
 @pytest.fixture
-def driving(tmp_path: Path, background: Path) -> Iterator[Server]:
-    server = Server(tmp_path / "recordings", recording=background)
-    server.change("PUT", "/source", ROBOT)
-    yield server
-    server.stop()
+def driving(make_server: Callable[..., Server]) -> Server:
+    """Plays a simulated robot that drives through the furnished room."""
+    server = make_server()
+    server.change("PUT", "/source", FURNISHED)
+    return server
 
 
 def tracked(http: httpx.Client) -> bool:
@@ -137,7 +137,7 @@ def test_a_map_that_was_built_is_localized_in_after_the_server_was_killed(
     path = tmp_path / "maps.db"
     server = serving(background, "--map", path)
     with httpx.Client(base_url=f"{server.url}api/v1", timeout=60) as http:
-        http.put("/source", json=ROBOT).raise_for_status()
+        http.put("/source", json=FURNISHED).raise_for_status()
         http.patch("/settings", json={"navigation": {"mode": "slam", "method": "scans"}}).raise_for_status()
         kept = lambda: [one for one in http.get("/sessions").json()["sessions"] if one["grid"]]  # noqa: E731
         wait_until(lambda: len(kept()) == 1, seconds=120)
@@ -146,7 +146,7 @@ def test_a_map_that_was_built_is_localized_in_after_the_server_was_killed(
     server.process.wait()
     again = serving(background, "--map", path)
     with httpx.Client(base_url=f"{again.url}api/v1", timeout=60) as http:
-        http.put("/source", json=ROBOT).raise_for_status()
+        http.put("/source", json=FURNISHED).raise_for_status()
         http.patch("/settings", json=LOCALIZE).raise_for_status()
         wait_until(lambda: tracked(http), seconds=120)
         assert http.get("/localization").json()["session"] == 1

@@ -12,9 +12,10 @@ import httpx
 import numpy as np
 import pytest
 from lidarcore_app.jobs.landmark_store import LandmarkStore
+from lidarcore_app.jobs.stored_grids import grid_to_stored
 from lidarcore_app.jobs.wall_writer import CONFIRMED, from_stored, to_stored
 from processes import Serving
-from serving import Server, assert_problem, write_room
+from serving import ROBOT, Server, assert_problem, write_room
 from waiting import wait_until
 
 from lidarcore.errors import (
@@ -28,7 +29,6 @@ from lidarcore.landmarks import Atlas, StoredWall
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
-ROBOT = {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}}
 WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
 
 
@@ -81,6 +81,9 @@ def test_walls_that_make_no_sense_leave_those_that_were_there(tmp_path: Path) ->
             with pytest.raises(LandmarkMapError):
                 kept.put_walls(wrong)
             assert kept.walls() == [stored(0), stored(1)]
+        with pytest.raises(LandmarkMapError):  # walls and the grid of the same moment: both or none
+            kept.put_walls([stored(5)], replace(grid_to_stored(GRID), resolution=math.nan))
+        assert kept.walls() == [stored(0), stored(1)]
 
 
 def test_what_a_wall_was_is_kept_once_a_second_and_stays_when_it_is_gone(tmp_path: Path) -> None:

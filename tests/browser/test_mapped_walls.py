@@ -39,7 +39,6 @@ def look(browser: Browser, mapped: Server) -> Iterator[Callable[..., Visitor]]:
         context.add_init_script("localStorage.setItem('welcomed', 'yes')")
         context.route("**/viser/**", lambda route: route.fulfill(body="", content_type="text/html"))
         visitor = Visitor(context.new_page(), mapped).open()
-        visitor.tolerated.append("404")  # the history of a wall begins once it was seen often enough
         visitors.append(visitor)
         visitor.page.get_by_role("tab", name="Map").click()
         wait_until(lambda: known(visitor) == walls(mapped), "the page has the walls")

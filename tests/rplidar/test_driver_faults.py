@@ -184,7 +184,7 @@ def test_a_warning_is_told_and_no_reason_to_stop() -> None:
 def test_something_else_that_talks_is_no_sensor() -> None:
     with Other(b"$GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n") as gps:
         start = time.monotonic()
-        with pytest.raises(NoAnswerError, match=r"not from an RPLIDAR.*right port"):
+        with pytest.raises(NoAnswerError, match=r"not those of an RPLIDAR.*right port"):
             Driver(gps.path).__enter__()
         assert time.monotonic() - start < PATIENCE / 2
 

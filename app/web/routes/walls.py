@@ -1,45 +1,37 @@
-"""The building as SLAM from whole scans has it now: walls, and which parts are occupied and free."""
+"""Walls of maps of whole scans: of the one that SLAM makes now, and of those that are kept."""
 
-import io
 import math
-import tempfile
 from collections.abc import Callable
-from functools import partial
-from pathlib import Path
 from typing import Annotated, Literal
-from zipfile import ZipFile
 
-import anyio
 import numpy as np
 from fastapi import APIRouter, Depends, Query
 from numpy.typing import NDArray
-from PIL import Image
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
+from lidarcore.errors import UnknownWallError
 from lidarcore.landmarks import Box, Circle
-from lidarcore.mapping import MapPicture
-from lidarcore.mapping.export import MAP_FILES, walls_csv, walls_geojson, write_map
-from lidarcore.mapping.grid import OccupancyGrid, shades_of
-from lidarcore.mapping.walls import Walls, WallTable, along, distances, in_box, nearest
+from lidarcore.mapping.export import walls_csv, walls_geojson
+from lidarcore.mapping.walls import WallTable, along, distances, in_box, nearest
 
 from ...errors import NotFoundError
+from ...jobs.landmark_store import LandmarkStore
 from ...jobs.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from ..wall_json import WallJson, wall_rows
-from .dependencies import CurrentLandmarks, CurrentRuntime, Heavy
+from .dependencies import CurrentLandmarks, CurrentRuntime
 from .examples import MEDIA_TYPES, ok
+from .grid import running_walls
 from .landmarks import USUAL, Limit, Metres, Region
 
 Mask = NDArray[np.bool_]
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422))
 
-NO_BUILDING = 'There is no map of whole scans: set navigation.mode to slam and navigation.method to "scans".'
 NO_SESSION = "No map is kept yet: wait for further scans, or give the session of one that is kept."
-NOT_YET = "The map of whole scans has no {} yet: wait for further scans."
 
 WALL = {
     "id": 0, "alpha": 0.0021, "r": 3.1007, "covariance": [[1.2e-06, 3.1e-07], [3.1e-07, 8.4e-06]],
@@ -55,9 +47,12 @@ class WallsJson(TypedDict):
 
 
 class WallHistoryJson(TypedDict):
-    """`wall` is null if it is no longer in the map: its last state is the last of the history."""
+    """`wall` is null if it is no longer in the map: its last state is the last of the history.
 
-    session: int
+    `session` is null, and the history empty, of a wall of the running map before anything of it is kept.
+    """
+
+    session: int | None
     wall: WallJson | None
     history: list[WallJson]
     next: float | None
@@ -98,7 +93,7 @@ def _asked(
         int | None, Query(description="of a map that is kept; if not given of the one that SLAM makes now")
     ] = None,
 ) -> WallTable:
-    return _walls(runtime) if session is None else landmarks.walls(session)
+    return running_walls(runtime) if session is None else landmarks.walls(session)
 
 
 Asked = Annotated[WallTable, Depends(_asked)]
@@ -153,6 +148,7 @@ def nearest_walls(
     responses=ok({"session": 3, "wall": WALL, "history": [WALL], "next": None}, "The wall") | documented(503),
 )
 def history(
+    runtime: CurrentRuntime,
     landmarks: CurrentLandmarks,
     id: int,
     after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
@@ -163,72 +159,41 @@ def history(
 ) -> Response:
     """One wall of a map that is kept, and what it was in each second in which it was seen, the oldest first.
 
-    So also of one that became part of another. It begins when three keyframes have seen the wall; 404 until then.
+    So also of one that became part of another. It begins when three keyframes have seen the wall; of a wall of the
+    running map it is empty until then.
     """
-    session = landmarks.session if session is None else session
+    kept = landmarks.session if session is None else session
+    try:
+        return encode(_kept_history(landmarks, kept, id, after, limit))
+    except (NotFoundError, UnknownWallError):
+        wall = _running_wall(runtime, id) if session is None else None
+        if wall is None:
+            raise
+        return encode({"session": kept, "wall": wall, "history": [], "next": None})
+
+
+def _kept_history(
+    landmarks: LandmarkStore, session: int | None, id: int, after: float, limit: int
+) -> WallHistoryJson:
     if session is None:
         raise NotFoundError(NO_SESSION)
     wall_map = landmarks.atlas[session]
     found = from_stored(wall_map.wall_history(id, after, limit))
     present = from_stored([wall for wall in wall_map.walls() if wall.id == id])
-    return encode(
-        {
-            "session": session,
-            "wall": next(iter(wall_rows(present, range(len(present)))), None),
-            "history": wall_rows(found, range(len(found))),
-            "next": float(found.last_seen[-1]) if len(found) == limit else None,
-        }
-    )
-
-
-@router.get(
-    "/map/grid",
-    response_class=Response,
-    responses={200: {"description": "The map", "content": {"image/png": {}, "application/zip": {}}}},
-)
-async def grid(
-    runtime: CurrentRuntime,
-    heavy: Heavy,
-    format: Annotated[
-        Literal["png", "zip"], Query(description="the grid as a picture, or all files of `lidarcore map`")
-    ] = "png",
-) -> Response:
-    """The map that SLAM makes of whole scans, as a picture of its occupancy grid or as files for other programs.
-
-    png: black occupied, white free, grey unknown, y up. Its headers say where it lies: Grid-Resolution is the side of a
-    pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
-    zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF.
-    404 if SLAM makes no map of whole scans, or has no walls yet.
-    """
-    found = _picture(runtime).grid
-    make = partial(_zip, found, _walls(runtime)) if format == "zip" else partial(_grid_png, found)
-    return await anyio.to_thread.run_sync(make, limiter=heavy)
-
-
-def _zip(grid: OccupancyGrid, walls: Walls) -> Response:
-    file = io.BytesIO()
-    with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder, ZipFile(file, "w") as archive:
-        write_map(folder, grid, walls)
-        for name in MAP_FILES:
-            archive.write(Path(folder) / name, name)
-    return Response(file.getvalue(), media_type=MEDIA_TYPES["zip"])
-
-
-def _grid_png(found: OccupancyGrid) -> Response:
-    file = io.BytesIO()
-    Image.fromarray(shades_of(found)).save(file, "PNG")
-    place = {
-        "Grid-Resolution": f"{found.resolution:g}",
-        "Grid-Origin": ",".join(f"{value:.9g}" for value in found.origin.tolist()),
+    return {
+        "session": session,
+        "wall": next(iter(wall_rows(present, range(len(present)))), None),
+        "history": wall_rows(found, range(len(found))),
+        "next": float(found.last_seen[-1]) if len(found) == limit else None,
     }
-    return Response(file.getvalue(), media_type="image/png", headers=place)
 
 
-def _walls(runtime: Runtime) -> Walls:
-    found = _picture(runtime).walls
-    if found is None:
-        raise NotFoundError(NOT_YET.format("walls"))
-    return found
+def _running_wall(runtime: Runtime, id: int) -> WallJson | None:
+    """A wall of the map that SLAM makes now."""
+    picture = runtime.navigation.picture
+    if picture is None or picture.walls is None:
+        return None
+    return next(iter(wall_rows(picture.walls, np.flatnonzero(picture.walls.ids == id).tolist())), None)
 
 
 def _within(walls: WallTable, region: Box | Circle | None) -> Mask:
@@ -237,11 +202,3 @@ def _within(walls: WallTable, region: Box | Circle | None) -> Mask:
     if isinstance(region, Circle):
         return distances(walls, (region.x, region.y)) <= region.radius
     return in_box(walls, (region.x_min, region.y_min), (region.x_max, region.y_max))
-
-
-def _picture(runtime: Runtime) -> MapPicture:
-    wanted, found = runtime.settings.navigation, runtime.navigation.picture
-    if found is not None:
-        return found
-    makes_one = wanted.mode == "slam" and wanted.method == "scans"
-    raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)

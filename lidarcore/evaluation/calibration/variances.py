@@ -127,7 +127,7 @@ def _ascend(sample: _Sample, beta: Array) -> Array:
             step, promised = step / 2, promised / 2
         beta = beta + step
     raise EvaluationError(
-        "The noise cannot be told: no sigma_range and sigma_bearing fit the scatter of the ranges."
+        "The noise cannot be determined: no sigma_range and sigma_bearing fit the scatter of the ranges."
     )
 
 

@@ -66,7 +66,7 @@ class Repeatability:
         """
         if missing := [name for name in self.methods if name not in features]:
             raise EvaluationError(
-                f"The features are without {', '.join(missing)}: compare() with every method."
+                f"The features lack {', '.join(missing)}: call compare() with every method."
             )
         features = {name: features[name] for name in self.methods}
         corners, walls = self._corner_tracker.rows(features), self._wall_tracker.rows(features)

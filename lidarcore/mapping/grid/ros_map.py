@@ -113,9 +113,9 @@ def _read_header(path: Path) -> _Header:
         return _Header.model_validate(document)
     except ValidationError as error:
         wrong = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'header'}: {e['msg']}" for e in error.errors())
-        raise MapFileError(f"{path.name} is no map that can be used: {wrong}.") from error
+        raise MapFileError(f"{path.name} cannot be used as a map: {wrong}.") from error
     except (YAMLError, RecursionError) as error:
-        raise MapFileError(f"{path.name} is no YAML: {error}") from error
+        raise MapFileError(f"{path.name} is not YAML: {error}") from error
 
 
 def _image_beside(path: Path, name: str) -> Path:
@@ -148,7 +148,7 @@ def _read_image(path: Path, header: _Header) -> Cells:
                 cells[band[1] : band[3]] = table[_codes(image.crop(band), is_deep)]
             return cells
     except UnidentifiedImageError as error:
-        raise MapFileError(f"{path.name} is no PGM, PNG or BMP.") from error
+        raise MapFileError(f"{path.name} is not a PGM, PNG or BMP image.") from error
 
 
 def _codes(image: Image.Image, is_deep: bool) -> Ints:

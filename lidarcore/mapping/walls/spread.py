@@ -52,6 +52,8 @@ def _roots(C: Array) -> Array:
     """Symmetric roots (K, 3, 3): unlike triangular ones, they change little where the covariance does."""
     values, vectors = np.linalg.eigh((C + C.swapaxes(1, 2)) / 2)
     if (values < -1e-9 * np.abs(values).max(initial=1e-30)).any():
-        raise CovarianceError("A covariance of a pose is not positive: give what the mapper gives.")
+        raise CovarianceError(
+            "The covariance of a pose is not positive definite: pass covariances as the mapper returns them."
+        )
     roots: Array = (vectors * np.sqrt(np.maximum(values, 0))[:, None]) @ vectors.swapaxes(1, 2)
     return roots

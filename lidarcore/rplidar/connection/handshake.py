@@ -26,8 +26,8 @@ def identify(port: Port, tries: int = PATIENT) -> DeviceInfo:
     for _ in range(tries):
         if not silence(port):
             raise NoAnswerError(
-                f"What comes from {port.path} is not from an RPLIDAR, or at another baud rate: check that this is the "
-                "right port and rate (256000 for an S1)."
+                f"The bytes from {port.path} are not those of an RPLIDAR, or the baud rate is wrong: check that this "
+                "is the right port and rate (256000 for an S1)."
             )
         if answer := ask(port, Command.GET_INFO, answer=Answer.INFO, size=DeviceInfo.SIZE, tries=1):
             return DeviceInfo.decode(answer)
@@ -139,7 +139,7 @@ def _ask_health(port: Port) -> Health:
     data = ask(port, Command.GET_HEALTH, answer=Answer.HEALTH, size=Health.SIZE)
     if data is None:
         raise NoAnswerError(
-            f"The sensor at {port.path} does not tell its health: check its power and cables."
+            f"The sensor at {port.path} does not report its health: check its power and cables."
         )
     return Health.decode(data)
 

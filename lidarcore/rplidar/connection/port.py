@@ -87,7 +87,7 @@ class Port:
                 self._serial.write(data)
         except SerialTimeoutException as error:
             raise NoAnswerError(
-                f"{self.path} takes no bytes: unplug the sensor and plug it in again."
+                f"{self.path} accepts no bytes: unplug the sensor and plug it in again."
             ) from error
         except (OSError, TerminalError) as error:
             raise self._unplugged() from error

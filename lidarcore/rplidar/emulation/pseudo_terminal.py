@@ -55,7 +55,7 @@ class PseudoTerminal:
             # Our end of the other side stays open: without it, nobody there would be an error.
             tty.setraw(ends[1])
         except (ImportError, OSError) as error:
-            raise DeviceError(f"This system gives no pseudo-terminal for the emulator: {error}.") from error
+            raise DeviceError(f"This system offers no pseudo-terminal for the emulator: {error}.") from error
         os.set_blocking(ends[0], False)
         self._ends = ends
         try:

@@ -1,0 +1,89 @@
+"""The map that SLAM makes of whole scans, as it is now: the picture of its grid, or all of it as files."""
+
+import io
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+from zipfile import ZipFile
+
+import anyio
+from fastapi import APIRouter, Query
+from PIL import Image
+from starlette.responses import Response
+
+from lidarcore.mapping import MapPicture
+from lidarcore.mapping.export import MAP_FILES, write_map
+from lidarcore.mapping.grid import OccupancyGrid, shades_of
+from lidarcore.mapping.walls import Walls
+
+from ...errors import NotFoundError
+from ...pipeline.runtime import Runtime
+from ..problems import documented
+from .dependencies import CurrentRuntime, Heavy
+from .examples import MEDIA_TYPES
+
+router = APIRouter(tags=["localization"], responses=documented(404, 422))
+
+NO_BUILDING = 'There is no map of whole scans: set navigation.mode to slam and navigation.method to "scans".'
+NOT_YET = "The map of whole scans has no {} yet: wait for further scans."
+
+
+def running_picture(runtime: Runtime) -> MapPicture:
+    """Grid and walls of the map that is made now. Raises NotFoundError."""
+    wanted, found = runtime.settings.navigation, runtime.navigation.picture
+    if found is not None:
+        return found
+    makes_one = wanted.mode == "slam" and wanted.method == "scans"
+    raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
+
+
+def running_walls(runtime: Runtime) -> Walls:
+    """The walls of the map that is made now. Raises NotFoundError."""
+    found = running_picture(runtime).walls
+    if found is None:
+        raise NotFoundError(NOT_YET.format("walls"))
+    return found
+
+
+@router.get(
+    "/map/grid",
+    response_class=Response,
+    responses={200: {"description": "The map", "content": {"image/png": {}, "application/zip": {}}}},
+)
+async def grid(
+    runtime: CurrentRuntime,
+    heavy: Heavy,
+    format: Annotated[
+        Literal["png", "zip"], Query(description="the grid as a picture, or all files of `lidarcore map`")
+    ] = "png",
+) -> Response:
+    """The map that SLAM makes of whole scans, as a picture of its occupancy grid or as files for other programs.
+
+    png: black occupied, white free, grey unknown, y up. Its headers say where it lies: Grid-Resolution is the side of a
+    pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
+    zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF.
+    404 if SLAM makes no map of whole scans, or has no walls yet.
+    """
+    found = running_picture(runtime).grid
+    make = partial(_zip, found, running_walls(runtime)) if format == "zip" else partial(_grid_png, found)
+    return await anyio.to_thread.run_sync(make, limiter=heavy)
+
+
+def _zip(grid: OccupancyGrid, walls: Walls) -> Response:
+    file = io.BytesIO()
+    with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder, ZipFile(file, "w") as archive:
+        write_map(folder, grid, walls)
+        for name in MAP_FILES:
+            archive.write(Path(folder) / name, name)
+    return Response(file.getvalue(), media_type=MEDIA_TYPES["zip"])
+
+
+def _grid_png(found: OccupancyGrid) -> Response:
+    file = io.BytesIO()
+    Image.fromarray(shades_of(found)).save(file, "PNG")
+    place = {
+        "Grid-Resolution": f"{found.resolution:g}",
+        "Grid-Origin": ",".join(f"{value:.9g}" for value in found.origin.tolist()),
+    }
+    return Response(file.getvalue(), media_type="image/png", headers=place)
