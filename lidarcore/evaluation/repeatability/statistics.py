@@ -136,7 +136,7 @@ class Repeatability:
             return None
         scans = len(self)
         ago = f"{scans} scan{'s' * (scans > 1)} ago" if scans else "just now"
-        return f"The sensor moved {ago}: the window began anew."
+        return f"The sensor moved {ago}: the window was started again."
 
 
 def _corners_seen(found: Features) -> Array:
