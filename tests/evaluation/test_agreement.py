@@ -9,7 +9,7 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.repeatability.looks import Look, moved
+from lidarcore.evaluation.repeatability.feature_set import FeatureSet, moved
 from lidarcore.evaluation.stations.agreement import GATE, Pair, coverage, differences, systematic_part
 from lidarcore.geometry import act, inverse
 
@@ -39,8 +39,8 @@ def look(pose, rng, tau=0.0, error=1.0):
     walls = np.column_stack([np.arange(6), (np.arange(6) + 1) % 6])
     n = np.stack([np.cos(lines[walls, 0]), np.sin(lines[walls, 0])], -1)
     corners = np.linalg.solve(n, lines[walls, 1][..., None])[..., 0]
-    plain = Look(lines, ends, covariances, corners, np.zeros((6, 2, 2)), walls)
-    return Look(lines, ends, covariances, corners, plain._of_corners(covariances), walls)
+    plain = FeatureSet(lines, ends, covariances, corners, np.zeros((6, 2, 2)), walls)
+    return FeatureSet(lines, ends, covariances, corners, plain._of_corners(covariances), walls)
 
 
 def pairs(count, seed=0, tau=0.0, error=1.0):
@@ -102,7 +102,7 @@ def test_lines_move_as_their_points_do_and_jacobians_are_those_of_finite_differe
 
 def test_looks_that_share_nothing_have_no_differences():
     rng = np.random.default_rng(2)
-    nothing = Look(
+    nothing = FeatureSet(
         np.empty((0, 2)),
         np.empty((0, 2, 2)),
         np.empty((0, 2, 2)),

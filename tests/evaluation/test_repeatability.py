@@ -17,7 +17,7 @@ from lidarcore import ExtractionSettings, Features, Scan, SensorNoise, compare, 
 from lidarcore import tables as columns
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.evaluation.repeatability.scatter import SIGHTING, Observations, scatter
+from lidarcore.evaluation.repeatability.scatter import OBSERVATION, Observations, scatter
 from lidarcore.evaluation.repeatability.statistics import Repeatability
 from lidarcore.evaluation.repeatability.summary import Judgement, verdict
 from lidarcore.evaluation.repeatability.tables import to_csv, to_json
@@ -112,7 +112,7 @@ def test_a_claim_halved_or_doubled_is_caught_with_its_figure(factor):
 def verdicts(corners, claim, studies, seed=0):
     """Shares of the verdicts on ellipses `claim` times the true covariance (2, 2), of corners seen in 100 scans."""
     rng, scans = np.random.default_rng(seed), 100
-    table = np.zeros((corners * scans, studies, SIGHTING))
+    table = np.zeros((corners * scans, studies, OBSERVATION))
     table[..., :2] = rng.normal(size=(corners * scans, studies, 2))
     table[..., 2:6] = table[..., 6:] = np.ravel(claim)
     ids, at = np.repeat(np.arange(corners), scans), np.tile(np.arange(scans), corners)
