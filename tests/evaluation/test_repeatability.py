@@ -330,7 +330,7 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing():
     with pytest.raises(EvaluationError, match="No method"):
         Repeatability(methods=[])
     study = Repeatability(methods=[METHOD, "cwlf"])
-    with pytest.raises(EvaluationError, match="without cwlf"):
+    with pytest.raises(EvaluationError, match="lack cwlf"):
         study.add(found(PLACES, COVARIANCE))
     assert len(study) == 0
 

@@ -233,7 +233,7 @@ def test_scan_options_that_no_sensor_has_are_refused() -> None:
 
 @pytest.mark.long
 def test_the_right_baud_rate_is_named_where_the_wrong_one_was_given(sensor: EmulatorProcess) -> None:
-    with pytest.raises(NoAnswerError, match="talks at 256000 baud, not at 115200"):
+    with pytest.raises(NoAnswerError, match="uses 256000 baud, not 115200: choose that rate"):
         Driver(sensor.port, baud=115_200).__enter__()
     with Driver(sensor.port) as driver:
         next(iter(driver))
