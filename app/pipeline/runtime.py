@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike
 from lidarcore import SensorNoise, Tracker, compare, localization, warm_up
 from lidarcore.body_mask import Sector, masked, suggest_mask
 from lidarcore.clusters import cluster
+from lidarcore.threads import FailureLog, join
 
 from ..errors import NotFoundError
 from ..sources.player import Player
 from ..sources.source import Source
 from ..sources.timed_scan import TimedScan
-from ..threads import FailureLog, join
 from .frame import Frame, Selection
 from .navigation import NOT_LOCALIZED, LocalizationStatus, Navigation
 from .newest import NewestScan

@@ -23,6 +23,7 @@ from lidarcore.rplidar.connection.session import ScanOptions, Session
 from lidarcore.rplidar.connection.statistics import Statistics, Tally
 from lidarcore.rplidar.protocol import S1_MODES, DeviceInfo, Health, Revolution, ScanMode
 from lidarcore.scan import Scan
+from lidarcore.threads import join
 
 State = Literal["connecting", "streaming", "stalled", "reconnecting", "closed"]
 
@@ -108,8 +109,7 @@ class Driver:
         forget_at_exit(self.close)
         self._closing.set()
         self._revolutions.close()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(CLOSING)
+        join(self._thread, CLOSING)
 
     def __iter__(self) -> Iterator[Scan]:
         """Scans as they are completed; the stamp is the Unix time of the first beam, in s."""
