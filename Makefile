@@ -18,19 +18,19 @@ run: .venv/.run
 
 test: .venv/.dev lint
 	@$(browser)
-	@$(ahead)
+	@$(precompile)
 	$(parallel) -m "not long"
 
 # Also the tests marked `long`, each of which takes more than a few seconds; three times as long in all.
 test-all: .venv/.dev lint
 	@$(browser)
-	@$(ahead)
+	@$(precompile)
 	$(parallel)
 
 # Of what `make test` runs.
 coverage: .venv/.dev
 	@$(browser)
-	@$(ahead)
+	@$(precompile)
 	$(parallel) -m "not long" --cov --cov-report=term:skip-covered
 
 # Whether the tests notice the seeded faults; in about half an hour.
@@ -47,7 +47,7 @@ soak: .venv/.dev
 
 parallel := $(bin)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder --max-worker-restart=0 --durations=15
 # Otherwise every process of the tests would compile the same kernels.
-ahead := $(bin)/python -m lidarcore.mapping.ahead
+precompile := $(bin)/python -m lidarcore.mapping.precompile
 browser := command -v chromium-headless-shell >/dev/null || { $(SUDO) apt-get update && $(SUDO) apt-get install -y --no-install-recommends chromium-headless-shell fonts-dejavu-core; }
 
 lint: .venv/.dev

@@ -9,6 +9,7 @@ from threading import Lock
 from typing import Generic, TypeVar
 
 from lidarcore import LidarError
+from lidarcore.threads import join
 
 MEMORY = 1 << 30  # bytes of data in the process
 QUIET = 60.0  # s without an item, after which it is taken to be stuck
@@ -62,7 +63,7 @@ class Isolated(Generic[Item]):
     def close(self) -> None:
         """End the process, and give up what connects to it. Any thread may call this."""
         self.kill()
-        self._process.join(END_WITHIN)
+        join(self._process, END_WITHIN)
         with self._lock:  # closed twice at a time, it would close what has its number since
             self._connection.close()
 

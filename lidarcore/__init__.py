@@ -58,6 +58,7 @@ __all__ = [
     "files",
     "noise",
     "open_recording",
+    "threads",
     "warm_up",
 ]
 

@@ -35,7 +35,7 @@ SENSORS: dict[str, SensorKind] = {
         ),
         "Medians of the calibrations of 14 places in three recordings (rplidar_csv_rooms), from 300 scans each of a "
         "sensor of this class at rest: ranges 0.2 to 1.7 mm nearby, bearings 0.5 to 1.1 mrad, walls uneven by 2.6 to "
-        "13 mm. What is anew in the next scan (renewal) has the median 0, the mean 0.06; 0.1 is cautious.",
+        "13 mm. What is new in the next scan (renewal) has the median 0, the mean 0.06; 0.1 is cautious.",
     ),
     "rplidar_c1": SensorKind(
         "RPLIDAR C1",

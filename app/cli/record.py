@@ -45,11 +45,11 @@ def record(
     if duration is not None and not duration <= LONGEST:
         raise typer.BadParameter(f"--duration is at most {LONGEST:g} s: leave it out to record until Ctrl-C.")
     from lidarcore import warm_up
-    from lidarcore.rplidar import Driver, EmulatorProcess, check_wishes
+    from lidarcore.rplidar import Driver, EmulatorProcess, check_scan_options
 
     from ..jobs.recorder import AsyncRecorder
 
-    check_wishes(mode if emulator else None, rpm)  # what modes a real one has it has to be asked
+    check_scan_options(mode if emulator else None, rpm)  # what modes a real one has it has to be asked
     chosen = settings_from(settings, set_)
     end_like_ctrl_c()
     recorder, troubles = AsyncRecorder(), list[str]()

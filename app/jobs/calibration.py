@@ -9,12 +9,12 @@ from typing import Literal
 
 from lidarcore import LidarError, Scan
 from lidarcore.evaluation.calibration.calibrate import LEAST_SCANS, calibrate
+from lidarcore.threads import join
 
 from ..errors import ConflictError
 from ..pipeline.frame import Frame
 from ..sources.player import Player
 from ..sources.source import Source
-from ..threads import join
 from .calibration_report import CalibrationReport, report
 
 MOST_SCANS = 300
@@ -56,7 +56,6 @@ class _Job:
     latest: float = field(default_factory=time.monotonic)
     message: str | None = None
     result: CalibrationReport | None = None
-    thread: threading.Thread | None = None
 
     def is_complete(self) -> bool:
         """Whether there are scans enough, or all that there are."""
@@ -73,6 +72,7 @@ class LiveCalibration:
         """`ready` tells whether scans can come: kernels are compiled first."""
         self._player, self._ready = player, ready
         self._job = _Job()
+        self._threads: list[threading.Thread] = []  # that calculate, also for jobs that were given up
         self._lock = threading.Lock()
 
     def start(self, scans: int) -> None:
@@ -88,9 +88,8 @@ class LiveCalibration:
 
     def close(self) -> None:
         """Give up, and wait for the end of what is being calculated."""
-        thread = self._job.thread
         self.cancel()
-        if thread:
+        for thread in self._threads:
             join(thread, END_WITHIN)
 
     def cancel(self) -> None:
@@ -113,11 +112,13 @@ class LiveCalibration:
                 job.beams += len(timed.scan)
             job.count = len(job.scans)
             if job.is_complete():
-                job.state = "calculating"
-                job.thread = threading.Thread(
-                    target=self._calculate, args=(job,), name="calibration", daemon=True
-                )
-                job.thread.start()
+                self._begin_to_calculate(job)
+
+    def _begin_to_calculate(self, job: _Job) -> None:
+        job.state = "calculating"
+        thread = threading.Thread(target=self._calculate, args=(job,), name="calibration", daemon=True)
+        self._threads = [*(other for other in self._threads if other.is_alive()), thread]
+        thread.start()
 
     def check_source(self) -> None:
         """Scans of one source say nothing on another one's noise: a change of it ends the collection."""

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from lidarcore.mapping import ahead
+from lidarcore.mapping import precompile
 
 
 @contextmanager
@@ -14,12 +14,12 @@ def compiled_ahead() -> Iterator[None]:
 
     It says nothing: without it everything works, later.
     """
-    if not ahead.is_missing():
+    if not precompile.is_missing():
         yield
         return
     # A session of its own: Ctrl-C ends the server, which then ends this process without a traceback in between.
     process = subprocess.Popen(
-        [sys.executable, "-m", ahead.__name__],
+        [sys.executable, "-m", precompile.__name__],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,

@@ -15,8 +15,8 @@ from lidarcore.localization import Landmarks
 from lidarcore.localization import from_stored as landmarks_from_stored
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
+from lidarcore.threads import join
 
-from ..threads import join
 from .map_file import grid_of, landmarks_of
 from .map_writer import MapChange, MapWriter
 from .stored_grids import grid_from_stored, grid_to_stored

@@ -9,10 +9,10 @@ from lidarcore import Array, ExtractionSettings, compare
 from lidarcore.body_mask import Sector
 from lidarcore.evaluation.repeatability.statistics import Repeatability
 from lidarcore.evaluation.repeatability.summary import Summary
+from lidarcore.threads import FailureLog
 
 from ..pipeline.frame import Frame
 from ..sources.timed_scan import TimedScan
-from ..threads import FailureLog
 from .spooler import Spooler
 
 WAITING = 10  # scans; each takes about a millisecond

@@ -7,9 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Generic, TypeVar
 
-from lidarcore import LidarError
-
-from .. import threads
+from lidarcore import LidarError, threads
 
 IDLE = 0.25  # s without anything to write, after which `idle` is called
 END_WITHIN = 10.0  # s that a slow disk may take for what waits

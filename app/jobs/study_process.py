@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from .. import threads
+from lidarcore import threads
 
 ROOT = Path(__file__).parents[2]  # nothing that lies in the current folder is imported by the study
 NICE = 10  # live view comes first

@@ -27,7 +27,7 @@ NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
 
 
 NOT_MOVED = (
-    "A map of whole scans begins where its first scan was taken: POST /localization/reset begins it anew. "
+    "A map of whole scans begins where its first scan was taken: POST /localization/reset starts a new map. "
     'To place the sensor, set navigation.method to "landmarks".'
 )
 NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."

@@ -14,16 +14,16 @@ from numpy.typing import ArrayLike
 from lidarcore import SensorNoise, Tracker, compare, localization, warm_up
 from lidarcore.body_mask import Sector, masked, suggest_mask
 from lidarcore.clusters import cluster
+from lidarcore.threads import FailureLog, join
 
 from ..errors import NotFoundError
 from ..sources.player import Player
 from ..sources.source import Source
 from ..sources.timed_scan import TimedScan
-from ..threads import FailureLog, join
 from .frame import Frame, Selection
 from .navigation import NOT_LOCALIZED, LocalizationStatus, Navigation
 from .newest import NewestScan
-from .noise_watch import NoiseWatch
+from .noise_check import NoiseCheck
 from .sensor_setups import SensorSetup, SensorSetups
 from .settings import Settings
 
@@ -64,7 +64,7 @@ class Runtime:
         self._tracker, self._source = Tracker(dormant=DORMANT), 0
         self._times: deque[float] = deque(maxlen=20)
         self._sequence = 0
-        self._noise_watch = NoiseWatch()
+        self._noise_check = NoiseCheck()
         self._processing = FailureLog("scan %s could not be processed")
         self._lock = threading.Lock()
         self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
@@ -180,12 +180,12 @@ class Runtime:
         scan = self.navigation.deskewed(timed, settings)
         begin = time.perf_counter()
         features = compare(scan, settings.extraction, settings.methods)
-        extracted = time.perf_counter()
+        extract_end = time.perf_counter()
         clusters = cluster(scan, settings.clusters) if settings.clustered else None
-        clustered = time.perf_counter()
+        cluster_end = time.perf_counter()
         main = next(iter(features.values()))
         localization = self.navigation.step(timed, scan, main, clusters, settings.landmark_method)
-        located = time.perf_counter()
+        locate_end = time.perf_counter()
         self._sequence += 1
         return Frame(
             sequence=self._sequence,
@@ -195,15 +195,15 @@ class Runtime:
             features=features,
             corners=self._tracker.rows(features),
             selection=self.selection,
-            extract_us=1e6 * (extracted - begin),
+            extract_us=1e6 * (extract_end - begin),
             clusters=clusters,
             localization=localization,
             paths=self.navigation.paths,
             picture=self.navigation.picture,
-            cluster_us=1e6 * (clustered - extracted),
-            locate_us=1e6 * (located - clustered),
+            cluster_us=1e6 * (cluster_end - extract_end),
+            locate_us=1e6 * (locate_end - cluster_end),
             rate_hz=self._rate(),
-            noise_remark=self._noise_watch.observe(main, timed.source),
+            noise_remark=self._noise_check.observe(main, timed.source),
             dropped=self._newest.dropped,
         )
 

@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Callable
 
 from lidarcore import Scan
+from lidarcore.threads import FailureLog, join
 
-from ..threads import FailureLog, join
 from .source import END_WITHIN, HISTORY, Source
 
 

@@ -8,7 +8,16 @@ from itertools import islice
 from typing import Literal
 
 from lidarcore import DeviceError, Scan
-from lidarcore.rplidar import BAUD, Driver, EmulatorProcess, Stream, Tap, check_wishes, find_devices, path_of
+from lidarcore.rplidar import (
+    BAUD,
+    Driver,
+    EmulatorProcess,
+    Stream,
+    Tap,
+    check_scan_options,
+    find_devices,
+    path_of,
+)
 
 from .history import HistorySource
 from .source import DeviceStatus
@@ -47,7 +56,7 @@ class LiveSource(HistorySource):
         self._started = False
         self._let_go: Callable[[], None] = lambda: None
         if options.emulated:
-            check_wishes(options.mode, options.rpm)  # before a process is started for them
+            check_scan_options(options.mode, options.rpm)  # before a process is started for them
         self.emulator = EmulatorProcess(on_end=self._emulator_ended) if options.emulated else None
         if self.emulator is not None:
             self.noise = self.emulator.noise

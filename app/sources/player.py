@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from ..threads import join
+from lidarcore.threads import join
+
 from .source import END_WITHIN, DeviceStatus, Source
 from .timed_scan import Position, SourceKind, TimedScan
 

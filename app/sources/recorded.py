@@ -13,9 +13,9 @@ import numpy as np
 
 from lidarcore import LidarError, RecordingError, Scan, TopicError, open_recording
 from lidarcore.body_mask import Sector
+from lidarcore.threads import join
 
 from ..isolation import Isolated
-from ..threads import join
 from .source import END_WITHIN, HISTORY, Source
 from .timed_scan import SourceKind
 

@@ -20,7 +20,7 @@ def html(result: ClusteringStudy) -> str:
     lead = (
         "The experiment of R. Urvina Córdova, E. Aguilar Torres and A. Prado Romo, “Simultaneous location and mapping "
         "for control of an autonomous mobile robot using LiDAR point cloud scans and Machine Learning methods”, "
-        f"simulated anew: {design.runs} runs on each of {len(TRAJECTORIES)} trajectories, seed {design.seed}. "
+        f"simulated again: {design.runs} runs on each of {len(TRAJECTORIES)} trajectories, seed {design.seed}. "
         "± gives the 95 % confidence interval of a mean over the runs."
     )
     sections = [

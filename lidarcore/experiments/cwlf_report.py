@@ -31,7 +31,7 @@ def html(result: CwlfStudy) -> str:
     """The report as one page that needs nothing else."""
     lead = (
         "The experiment of N. Prieto-Fernández et al., “Conditional Weighted Linear Fitting for 2D-LiDAR-Mapping of "
-        "Indoor SLAM” (IEEE Transactions on Industrial Informatics 20(7), 2024), run anew. Beside what each method "
+        "Indoor SLAM” (IEEE Transactions on Industrial Informatics 20(7), 2024), run again. Beside what each method "
         "claims of its corners stands how they truly scatter. Brackets give 95 % confidence intervals."
     )
     sections = [

@@ -27,7 +27,7 @@ def html(result: WctlsStudy) -> str:
     lead = (
         "The experiment of N. Prieto-Fernández et al., “Enhancement of the Total Least Squares Method for Feature "
         "Extraction in 2D LiDAR Mapped Environments” (Computer Modeling in Engineering & Sciences 147(2), 2026), run "
-        "anew. Beside what each method claims of its corners stands how they truly scatter. Brackets give 95 % "
+        "again. Beside what each method claims of its corners stands how they truly scatter. Brackets give 95 % "
         "confidence intervals."
     )
     sections = [

@@ -99,7 +99,7 @@ def _with_ids(pairs: Ints, landmarks: Landmarks) -> Ints:
 NO_ODOMETRY = "No odometry arrives: the pose is predicted at constant velocity."
 NEW_MAP = "Too few landmarks were known to recover the pose: a new map was started."
 STATE_MESSAGES: dict[State, str] = {
-    "coasting": "No landmark was recognized: the pose is only predicted.",
+    "coasting": "No landmark was recognised: the pose is only predicted.",
     "lost": "The pose is lost: searching for it in the map.",
 }
 

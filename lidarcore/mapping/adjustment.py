@@ -22,7 +22,7 @@ _OUTLIER = 9.0  # squared standard deviations from which on a patch counts less
 _PASSES = 4  # over a cell, until outliers no longer move its line
 
 
-class Sightings(NamedTuple):
+class Observations(NamedTuple):
     """M patches, sorted by the cells that they lie in and by keyframe.
 
     keyframes  (M,) which keyframe saw each
@@ -37,7 +37,7 @@ class Sightings(NamedTuple):
     variances: Array
 
 
-class Sums(NamedTuple):
+class NormalEquations(NamedTuple):
     """The normal equations of K poses, without the lines of the cells, and what is left of each group.
 
     information  (3 K, 3 K) sparse
@@ -52,8 +52,8 @@ class Sums(NamedTuple):
 
 
 def normal_equations(
-    seen: Sightings, poses: Array, islands: Ints, size: float, scale: float, unevenness: float
-) -> tuple[Sums, int]:
+    seen: Observations, poses: Array, islands: Ints, size: float, scale: float, unevenness: float
+) -> tuple[NormalEquations, int]:
     """The normal equations at poses (K, 3), and how many cells were seen by several keyframes of one island (K,).
 
     The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
@@ -68,7 +68,7 @@ def normal_equations(
         seen.keyframes[order], poses, arms[order], normals[order], seen.variances[order], starts,
         scale, unevenness**2, D, g, U, at, groups,
     )  # fmt: skip
-    return Sums(_sparse(D, U[:number], at[:number], shared), g.ravel(), groups[:number]), shared
+    return NormalEquations(_sparse(D, U[:number], at[:number], shared), g.ravel(), groups[:number]), shared
 
 
 def _ordered(places: Array, normals: Array, size: float, keyframes: Ints) -> tuple[Ints, Ints]:
@@ -144,9 +144,9 @@ def _sum(
                 U[number, p, 1] = S[p, 1] * l11
             at[number, 0], at[number, 1] = k, lines
             lever /= max(total, 1e-12)
-            taken = total * (N[1, 1] - 2 * N[0, 1] * lever + N[0, 0] * lever * lever) / det
+            leverage = total * (N[1, 1] - 2 * N[0, 1] * lever + N[0, 0] * lever * lever) / det
             groups[number, 0], groups[number, 1] = (mean / noise) ** 2, 1 / noise
-            groups[number, 2] = 1 - taken
+            groups[number, 2] = 1 - leverage
             number += 1
             i = j
         lines += 1

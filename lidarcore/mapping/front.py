@@ -1,4 +1,4 @@
-"""The front end: each scan is laid on the surfaces of the last keyframes, in a local frame that loops never bend."""
+"""The front end: registers each scan on the surfaces of the last keyframes, in a local frame that loops never bend."""
 
 from collections import deque
 from dataclasses import dataclass, replace
@@ -9,8 +9,8 @@ from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
 from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
 from lidarcore.mapping.correlative import search
-from lidarcore.mapping.laying import Laid, information_of, lay
 from lidarcore.mapping.patches import Patches, patches
+from lidarcore.mapping.registration import Registration, information_of, register
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.surfels import Surfels, surfels
 from lidarcore.mapping.sweep import NOTHING, PAUSE, Sweep, is_swept, without
@@ -18,7 +18,7 @@ from lidarcore.scan import Scan
 
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 _FLOOR = np.diag([0.01, 0.01, 0.005]) ** 2  # what a step is never known better than: the search needs room
-_BLIND = 20  # patches: nothing can be laid on a scan that has fewer
+_BLIND = 20  # patches: nothing can be registered on a scan that has fewer
 _SLOW = 0.1  # weight of the last scan in the usual time between two
 _FURTHER = 3.0  # times as far is looked for a scan that does not fit
 _SURE = 0.6  # share of a scan on the map from which on it needs no search
@@ -99,24 +99,24 @@ class FrontEnd:
         wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
         scan = self._sweep.remove(scan, wheels, removed)
         seen = patches(scan, self._settings.match)
-        laid = self._laid(seen, guess)
-        if laid.inliers >= _SURE and dt > 0:
-            found = relative(self._known.pose, self._tie(laid).pose) / dt
+        registered = self._registered(seen, guess)
+        if registered.inliers >= _SURE and dt > 0:
+            found = relative(self._known.pose, self._tie(registered).pose) / dt
             corrected = self._sweep.correct(scan, found, dt)
             if corrected is not scan:
                 scan, seen = corrected, patches(corrected, self._settings.match)
-                laid = self._laid_again(seen, guess, laid.pose)
-        rival = self._rival(seen, guess, laid)
-        on = laid.inliers >= self._settings.inliers and rival is None
-        tie = self._tie(laid) if on else guess
+                registered = self._registered_again(seen, guess, registered.pose)
+        rival = self._rival(seen, guess, registered)
+        on = registered.inliers >= self._settings.inliers and rival is None
+        tie = self._tie(registered) if on else guess
         tie = UncertainPose(tie.pose, tie.covariance + self._sweep.covariance)
         if rival is not None:
-            tie = self._either(laid, rival)
+            tie = self._either(registered, rival)
         island = len(seen.means) >= _BLIND and not on and bool(tie.covariance[2, 2] > VAGUE**2)
         self._motion = relative(self._known.pose, tie.pose) if on else np.zeros(3)
         self._period += _SLOW * (dt - self._period)
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
-        leaves = island or (len(seen.means) >= _BLIND and self._leaves(tie[0], laid.inliers))
+        leaves = island or (len(seen.means) >= _BLIND and self._leaves(tie[0], registered.inliers))
         tracked = Tracked(
             scan.stamp, self._number - 1, tie, moved, on, scan, seen, self._sweep.covariance,
             self._sweep.removed, leaves, island, self._first if leaves else None,
@@ -141,11 +141,13 @@ class FrontEnd:
         given, velocity = np.zeros(3) if removed is None else removed, first.velocity
         straight = first
         for _ in range(_ROUNDS):
-            laid = self._laid(patches(without(scan, velocity - given), self._settings.match), driven)
-            if laid.inliers < _SURE:
+            registered = self._registered(
+                patches(without(scan, velocity - given), self._settings.match), driven
+            )
+            if registered.inliers < _SURE:
                 straight = first
                 break
-            velocity = laid.pose / dt
+            velocity = registered.pose / dt
             bare = without(first.scan, velocity - first.velocity)
             straight = replace(
                 first, scan=bare, patches=patches(bare, self._settings.match), velocity=velocity
@@ -190,64 +192,66 @@ class FrontEnd:
             )
         return dt, UncertainPose(motion, s.odometry.covariance(motion) + _FLOOR)
 
-    def _laid(self, seen: Patches, guess: UncertainPose) -> Laid:
+    def _registered(self, seen: Patches, guess: UncertainPose) -> Registration:
         """The scan on the local map: from the guess on, and after a search where the guess is vague or does not fit."""
         assert self._map is not None
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         prior = information_of(P)
         sigma = np.sqrt(np.diagonal(P))
         far = np.percentile(np.hypot(*seen.means.T), 80) if len(seen.means) else 0.0
-        laid = lay(self._map, seen, x, x, prior, match.reach)
-        if laid.inliers < _SURE or 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE:
-            laid = self._searched(seen, x, sigma, prior, laid)
-        if laid.inliers < _SURE:
-            laid = self._searched(seen, x, _FURTHER * sigma, prior, laid)
-        return laid
+        registered = register(self._map, seen, x, x, prior, match.reach)
+        if registered.inliers < _SURE or 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE:
+            registered = self._searched(seen, x, sigma, prior, registered)
+        if registered.inliers < _SURE:
+            registered = self._searched(seen, x, _FURTHER * sigma, prior, registered)
+        return registered
 
-    def _laid_again(self, seen: Patches, guess: UncertainPose, pose: Array) -> Laid:
+    def _registered_again(self, seen: Patches, guess: UncertainPose, pose: Array) -> Registration:
         """The scan on the local map, from a pose near the right one."""
         assert self._map is not None
         x, P = UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
-        return lay(self._map, seen, pose, x, information_of(P), self._settings.match.reach)
+        return register(self._map, seen, pose, x, information_of(P), self._settings.match.reach)
 
-    def _searched(self, seen: Patches, x: Array, sigma: Array, prior: Array, laid: Laid) -> Laid:
-        """The better one of where the scan was laid and where a search finds it."""
+    def _searched(
+        self, seen: Patches, x: Array, sigma: Array, prior: Array, registered: Registration
+    ) -> Registration:
+        """The better one of where the scan was registered and where a search finds it."""
         assert self._map is not None
         match = self._settings.match
         start = search(self._map.means, seen.means, x, sigma, match)
-        other = lay(self._map, seen, start, x, prior, match.reach)
-        return other if other.inliers > laid.inliers + _BETTER else laid
+        other = register(self._map, seen, start, x, prior, match.reach)
+        return other if other.inliers > registered.inliers + _BETTER else registered
 
-    def _rival(self, seen: Patches, guess: UncertainPose, laid: Laid) -> Array | None:
+    def _rival(self, seen: Patches, guess: UncertainPose, registered: Registration) -> Array | None:
         """Another pose (3,) at which a scan that fits badly fits nearly as well, if the guess leaves it open."""
         assert self._map is not None
-        if not self._settings.inliers <= laid.inliers < _SURE or len(seen.means) < _BLIND:
+        if not self._settings.inliers <= registered.inliers < _SURE or len(seen.means) < _BLIND:
             return None
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
-        sigma, prior, besides = np.sqrt(np.diagonal(P)), information_of(P), laid.pose[None]
+        sigma, prior, besides = np.sqrt(np.diagonal(P)), information_of(P), registered.pose[None]
         if 3 * np.hypot(sigma[0], sigma[1]) < _WIDE:
             return None
         for _ in range(_RIVALS):
             start = search(self._map.means, seen.means, x, sigma, match, besides)
-            other = lay(self._map, seen, start, x, prior, match.reach)
-            off = pose_difference(laid.pose, other.pose)
-            if other.inliers >= _RIVAL * laid.inliers and (
+            other = register(self._map, seen, start, x, prior, match.reach)
+            off = pose_difference(registered.pose, other.pose)
+            if other.inliers >= _RIVAL * registered.inliers and (
                 np.hypot(*off[:2]) > _WIDE or abs(off[2]) > _TURNED
             ):
                 return other.pose
             besides = np.concatenate([besides, start[None]])
         return None
 
-    def _either(self, laid: Laid, rival: Array) -> UncertainPose:
+    def _either(self, registered: Registration, rival: Array) -> UncertainPose:
         """The pose seen from the keyframe, so uncertain that it may be the rival."""
-        pose, P = self._tie(laid)
+        pose, P = self._tie(registered)
         off = pose_difference(relative(self._anchor, rival), pose)
         return UncertainPose(pose, P + np.outer(off, off) + np.diag(off**2))
 
-    def _tie(self, laid: Laid) -> UncertainPose:
+    def _tie(self, registered: Registration) -> UncertainPose:
         """The pose seen from the keyframe."""
         exact = UncertainPose(self._anchor, np.zeros((3, 3)))
-        return exact.relative(UncertainPose(laid.pose, information_of(laid.information)))
+        return exact.relative(UncertainPose(registered.pose, information_of(registered.information)))
 
     def _leaves(self, pose: Array, inliers: float) -> bool:
         """True if a scan at this pose from its keyframe is to be one itself."""

@@ -1,6 +1,5 @@
 """Where keyframes lie in a known map, in a thread of its own: a scan never waits for a search."""
 
-import logging
 from collections import deque
 from typing import Literal
 
@@ -16,8 +15,7 @@ from lidarcore.mapping.relocation import Relocation, Relocator, Verdict, query_o
 from lidarcore.mapping.settings import VAGUE
 from lidarcore.mapping.worker import Worker
 from lidarcore.scan import Scan
-
-_log = logging.getLogger(__name__)
+from lidarcore.threads import FailureLog
 
 _TOGETHER = 6  # keyframes that are looked for together
 _MISSES = 3  # keyframes in a row that the map contradicts, after which the pose is not believed
@@ -61,6 +59,7 @@ class LocateWorker:
         self._verdict: tuple[State, str | None] = "starting", None
         self._misses = 0
         self._begin, self._is_confirmed = self._local, False  # where the pose was found
+        self._failures = FailureLog("a keyframe could not be found in the map")
         self._worker = Worker(self._work, "locate") if background else None
 
     @property
@@ -101,12 +100,11 @@ class LocateWorker:
     def _work(self, item: Tracked | UncertainPose | None, waiting: int) -> None:
         if item is None:
             return
-        try:
-            self._step(item, waiting)
-        except LocalizationError as error:  # a map in which nothing can be found
-            self._verdict = "lost", str(error)
-        except Exception:  # one bad keyframe ends nothing
-            _log.exception("a keyframe could not be found in the map")
+        with self._failures():
+            try:
+                self._step(item, waiting)
+            except LocalizationError as error:  # a map in which nothing can be found
+                self._verdict = "lost", str(error)
 
     def _step(self, item: Tracked | UncertainPose, waiting: int) -> None:
         if isinstance(item, UncertainPose):

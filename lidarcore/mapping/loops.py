@@ -1,6 +1,6 @@
-"""Loops: which earlier places a new one is laid on, and which of these ties are believed.
+"""Loops: which earlier places a new one is registered on, and which of these ties are believed.
 
-What the last keyframes saw together is laid on what those of an earlier pass saw together. A tie must lie in the
+What the last keyframes saw together is registered on what those of an earlier pass saw together. A tie must lie in the
 chi-square gate of what the graph expects. Where the graph is too vague for that to exclude a wrong one, it waits until
 others along a stretch of the way agree with it [Olson, ICRA 2009; Mangelson et al., ICRA 2018], and is believed only if
 no rival that says something else has nearly as many that agree.
@@ -13,9 +13,9 @@ from lidarcore.geometry import chi_square_gate, relative
 from lidarcore.mapping.consistency import Loop, agree, agreeing, spread, squared, support
 from lidarcore.mapping.correlative import search
 from lidarcore.mapping.keyframes import Keyframe, joined
-from lidarcore.mapping.laying import Laid, information_of, lay
 from lidarcore.mapping.patches import Patches
 from lidarcore.mapping.pose_graph import PoseGraph
+from lidarcore.mapping.registration import Registration, information_of, register
 from lidarcore.mapping.settings import VAGUE, LoopSettings, MatchSettings
 from lidarcore.mapping.sight import agreement
 from lidarcore.mapping.surfels import Surfels, surfels
@@ -62,7 +62,7 @@ class LoopFinder:
         return believed
 
     def tie(self, nodes: Ints, k: int, P: Array) -> Loop | None:
-        """Node k laid on the one of earlier nodes that saw most of the same; the graph has it right within P (3, 3)."""
+        """Node k registered on the earlier node that saw most of the same; the graph has it right within P (3, 3)."""
         i = self._best(nodes, k, P) if len(nodes) else None
         if i is None:
             return None
@@ -72,7 +72,7 @@ class LoopFinder:
     def conclude(self) -> list[Loop]:
         """Loops to believe of the last nodes, which no further ones will support: all fit, and nothing else does.
 
-        The newest scans alone are laid on each earlier pass, within all of what the graph leaves open.
+        The newest scans alone are registered on each earlier pass, within all of what the graph leaves open.
         """
         way, found = self._way(), []
         for k in range(max(1, len(way) - 2 * self._settings.apart), len(way)):
@@ -135,12 +135,12 @@ class LoopFinder:
         earlier = self._submap(i, nodes)
         reference = surfels([earlier], np.zeros((1, 3)), match.patch, match.reach)
         mean = relative(self._graph.poses[i], self._graph.poses[k])
-        first = self._laid(i, k, mean, P, reference, seen, np.empty((0, 3)))
+        first = self._registered(i, k, mean, P, reference, seen, np.empty((0, 3)))
         if first is None:
             return []
         if 3 * spread(P) < match.reach:
             return [first]
-        second = self._laid(i, k, mean, P, reference, seen, first.pose[None])
+        second = self._registered(i, k, mean, P, reference, seen, first.pose[None])
         if second is None or second.quality < _RIVAL * first.quality or self._same(first, second):
             return [first]
         return [first, second]
@@ -149,21 +149,21 @@ class LoopFinder:
         """True if two poses are one, known only vaguely (along a corridor)."""
         return squared(a.pose, b.pose, a.covariance + b.covariance) < self._gate
 
-    def _laid(
+    def _registered(
         self, i: int, k: int, mean: Array, P: Array, reference: Surfels, seen: Patches, besides: Array
     ) -> Loop | None:
         """The best place besides others; None if it does not fit, or not what the graph expects."""
         P = _CAUTION * P + _FLOOR
         prior, match = information_of(_WIDEN * P), self._match_settings
         start = search(reference.means, seen.means, mean, np.sqrt(np.diagonal(P)), match, besides)
-        laid: Laid = lay(reference, seen, start, mean, prior, match.reach)
-        if laid.inliers < self._settings.inliers:
+        registered: Registration = register(reference, seen, start, mean, prior, match.reach)
+        if registered.inliers < self._settings.inliers:
             return None
-        conflicts = self._conflicts(i, k, laid.pose)
-        C = information_of(laid.information) + self._settings.floor
-        if conflicts > self._settings.conflicts or squared(laid.pose, mean, C + P) > self._gate:
+        conflicts = self._conflicts(i, k, registered.pose)
+        C = information_of(registered.information) + self._settings.floor
+        if conflicts > self._settings.conflicts or squared(registered.pose, mean, C + P) > self._gate:
             return None
-        return Loop(i, k, laid.pose, C, laid.inliers - conflicts)
+        return Loop(i, k, registered.pose, C, registered.inliers - conflicts)
 
     def _conflicts(self, i: int, k: int, pose: Array) -> float:
         """Largest share of either scan that lies where the other one looked through."""

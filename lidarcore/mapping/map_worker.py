@@ -1,6 +1,5 @@
 """The back of the live map, in a thread of its own: loops, grid and walls, none of which a scan waits for."""
 
-import logging
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -19,8 +18,7 @@ from lidarcore.mapping.settings import VAGUE, MapperSettings
 from lidarcore.mapping.walls import WallIds, Walls, find_walls
 from lidarcore.mapping.worker import Worker
 from lidarcore.settings import ExtractionSettings
-
-_log = logging.getLogger(__name__)
+from lidarcore.threads import FailureLog
 
 _EVERY = 1.0  # s between two pictures of the map, at least
 _REST = 10.0  # times as long as the walls took to find, they are not sought again
@@ -55,7 +53,7 @@ class MapWorker:
         self._builder, self._drawn = GridBuilder(GridSettings(most_cells=_MOST_CELLS)), 0
         self._wall_ids = WallIds()
         self._next_picture = self._next_walls = 0.0
-        self._failing = False
+        self._failures = FailureLog("the map could not be brought up to date")
         self._worker: Worker[Tracked] = Worker(self._work, "map", idle=_EVERY)
 
     @property
@@ -86,13 +84,8 @@ class MapWorker:
         self._worker.close(END_WITHIN)
 
     def _work(self, tracked: Tracked | None, _: int) -> None:
-        try:
+        with self._failures():
             self._step(tracked)
-            self._failing = False
-        except Exception:  # one bad keyframe ends nothing, and a thousand do not fill the log
-            if not self._failing:
-                _log.exception("the map could not be brought up to date")
-            self._failing = True
 
     def _step(self, tracked: Tracked | None) -> None:
         if tracked is not None:

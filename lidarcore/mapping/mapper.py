@@ -11,10 +11,10 @@ from lidarcore.mapping.back import BackEnd, Snapshot
 from lidarcore.mapping.consistency import Loop
 from lidarcore.mapping.front import FrontEnd, Tracked
 from lidarcore.mapping.keyframes import Keyframes
+from lidarcore.mapping.motion_smoothing import ScanMotion, half_time, smoothed
 from lidarcore.mapping.pose_graph import PoseGraph
 from lidarcore.mapping.refinement import Refined
 from lidarcore.mapping.settings import MapperSettings
-from lidarcore.mapping.settling import Taken, half_time, settled
 from lidarcore.mapping.worker import Worker
 from lidarcore.scan import Scan
 
@@ -61,7 +61,7 @@ class Mapper:
         self._worker = Worker(self._add, "mapper") if background else None
         self._stamps: list[float] = []
         self._ties: list[tuple[int, UncertainPose]] = []
-        self._taken: list[Taken] = []
+        self._motions: list[ScanMotion] = []
         self._numbers: list[int] = []
         self._locals: list[Array] = []  # T_local_keyframe, in the front end's frame
         self._loops = 0
@@ -96,8 +96,8 @@ class Mapper:
             else:
                 self._worker.put(tracked)
         if tracked.first is not None:
-            self._taken[0] = _taken(tracked.first)
-        self._taken.append(_taken(tracked))
+            self._motions[0] = _motion_of(tracked.first)
+        self._motions.append(_motion_of(tracked))
         self._stamps.append(tracked.stamp)
         self._ties.append(tie)
         snapshot = self._back.snapshot
@@ -112,26 +112,26 @@ class Mapper:
         if self._worker is not None:
             self._worker.join()
         with self._back.lock:
-            self._settle()
+            self._smooth_motion()
             if self._back.search_again():
                 self._back.search_again()
             self._refined = self._back.refine()
         self._loops = len(self._back.loops)
 
-    def _settle(self) -> None:
+    def _smooth_motion(self) -> None:
         """Take out of the scans the motion that all of them show; what hangs on keyframes moves with them."""
         nodes = np.array([node for node, _ in self._ties], np.int64)
         at = compose(np.array(self._locals)[nodes], np.array([tie.pose for _, tie in self._ties]))
-        at, after = settled(np.array(self._stamps), at, self._taken)
+        at, after = smoothed(np.array(self._stamps), at, self._motions)
         for node, number in enumerate(self._numbers):
-            old, new = self._taken[number], after[number]
+            old, new = self._motions[number], after[number]
             self._back.renew(node, new.velocity - old.velocity, new.sweep)
             self._locals[node] = at[number]
         for number, (node, tie) in enumerate(self._ties):
             if number != self._numbers[node]:
-                P = tie.covariance - self._taken[number].sweep + after[number].sweep
+                P = tie.covariance - self._motions[number].sweep + after[number].sweep
                 self._ties[number] = node, UncertainPose(relative(self._locals[node], at[number]), P)
-        self._taken = after
+        self._motions = after
 
     @property
     def loops(self) -> tuple[Loop, ...]:
@@ -193,6 +193,6 @@ class Mapper:
         return compose(snapshot.poses[-1], inverse(self._locals[known - 1])) if known else np.zeros(3)
 
 
-def _taken(tracked: Tracked) -> Taken:
-    laid = np.diagonal(tracked.tie.covariance - tracked.sweep)
-    return Taken(half_time(tracked.scan), tracked.velocity, laid, tracked.sweep, tracked.on)
+def _motion_of(tracked: Tracked) -> ScanMotion:
+    variances = np.diagonal(tracked.tie.covariance - tracked.sweep)
+    return ScanMotion(half_time(tracked.scan), tracked.velocity, variances, tracked.sweep, tracked.on)

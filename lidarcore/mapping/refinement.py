@@ -14,7 +14,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import UncertainPose, pose_difference, relative, relative_jacobians, rotation, wrap
-from lidarcore.mapping.adjustment import Sightings, Sums, normal_equations
+from lidarcore.mapping.adjustment import NormalEquations, Observations, normal_equations
 from lidarcore.mapping.patches import Patches
 
 _FIXED = 1e12  # information of the first pose
@@ -93,32 +93,32 @@ def refine(
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
-    seen = _sightings(scans, assumed**2)
+    seen = _observations(scans, assumed**2)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
-        sums, cells = normal_equations(seen, poses, islands, size, scale, unevenness)
-        H, g = _with_steps(sums, poses, steps)
+        equations, cells = normal_equations(seen, poses, islands, size, scale, unevenness)
+        H, g = _with_steps(equations, poses, steps)
         factor = _factor(H)
         step = factor.solve(-g).reshape(-1, 3)
         poses = poses + step
         poses[:, 2] = wrap(poses[:, 2])
-        scale, unevenness = _measured(sums.groups, cells, len(poses))
+        scale, unevenness = _measured(equations.groups, cells, len(poses))
         if np.abs(step).max() < _SETTLED:
             break
-    sums, _ = normal_equations(seen, poses, islands, size, scale, unevenness)
-    return Refined(poses, sweeps, scale, unevenness, _factor(_with_steps(sums, poses, steps)[0]))
+    equations, _ = normal_equations(seen, poses, islands, size, scale, unevenness)
+    return Refined(poses, sweeps, scale, unevenness, _factor(_with_steps(equations, poses, steps)[0]))
 
 
-def _sightings(scans: list[Patches], assumed: float) -> Sightings:
+def _observations(scans: list[Patches], assumed: float) -> Observations:
     """All patches, with the variance of noise alone: that of unevenness, m², is taken out."""
     numbers = np.repeat(np.arange(len(scans)), [len(scan.means) for scan in scans])
     columns = zip(*((scan.means, scan.normals, scan.variances - assumed) for scan in scans), strict=True)
-    return Sightings(numbers, *(np.concatenate(column) for column in columns))
+    return Observations(numbers, *(np.concatenate(column) for column in columns))
 
 
-def _with_steps(sums: Sums, poses: Array, steps: list[Step]) -> tuple[csc_array, Array]:
+def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> tuple[csc_array, Array]:
     """The normal equations with the steps, as far as they agree with the poses, and the first pose fixed."""
-    H, g = sums.information, sums.gradient.copy()
+    H, g = equations.information, equations.gradient.copy()
     ends = np.array([(step.i, step.j) for step in steps], np.int64).reshape(-1, 2)
     z = np.array([step.pose for step in steps]).reshape(-1, 3)
     W = np.linalg.inv(np.array([step.covariance for step in steps]).reshape(-1, 3, 3))

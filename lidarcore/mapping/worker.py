@@ -5,6 +5,8 @@ from collections import deque
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
+from lidarcore.threads import join
+
 Item = TypeVar("Item")
 
 
@@ -48,10 +50,10 @@ class Worker(Generic[Item]):
             self._closing = True
             self._filled.notify_all()
 
-    def close(self, within: float | None = None) -> None:
-        """End after the item at hand, and wait for it, at most so many seconds."""
+    def close(self, within: float = threading.TIMEOUT_MAX) -> bool:
+        """End after the item at hand, and wait for it, at most so many seconds; whether it has ended."""
         self.end()
-        self._thread.join(within)
+        return join(self._thread, within)
 
     def _check(self) -> None:
         if self._failure is not None:

@@ -76,10 +76,10 @@ class RecordingWriter:
 
         mask  of the robot's body; the one of the last scan is that of the recording
         """
-        from lidarcore.recordings.ros.content import contents
+        from lidarcore.recordings.ros.encoding import encoded
 
         self._file.check_open()
-        made = contents(scan, features, self._ellipse_scale)
+        made = encoded(scan, features, self._ellipse_scale)
         self._keep(mask)
         self._advance(scan.stamp)
         for topic, (type_, message) in made.items():

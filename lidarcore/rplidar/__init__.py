@@ -11,7 +11,7 @@ from lidarcore.rplidar.capture import CaptureWriter, Direction, Piece, Stream
 from lidarcore.rplidar.connection.devices import FoundDevice, find_devices
 from lidarcore.rplidar.connection.port import Tap, path_of
 from lidarcore.rplidar.connection.statistics import Statistics
-from lidarcore.rplidar.driver import BAUD, Driver, State, check_wishes
+from lidarcore.rplidar.driver import BAUD, Driver, State, check_scan_options
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.rplidar.protocol import DeviceInfo, Health, Revolution, ScanMode
 
@@ -31,7 +31,7 @@ __all__ = [
     "Statistics",
     "Stream",
     "Tap",
-    "check_wishes",
+    "check_scan_options",
     "emulator",
     "find_devices",
     "path_of",

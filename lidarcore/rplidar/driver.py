@@ -19,10 +19,11 @@ from lidarcore.rplidar.connection.handshake import choose_mode
 from lidarcore.rplidar.connection.latest import Latest
 from lidarcore.rplidar.connection.port import Cancelled, ListPorts, Tap
 from lidarcore.rplidar.connection.reconnection import find_again
-from lidarcore.rplidar.connection.session import Session, Wishes
+from lidarcore.rplidar.connection.session import ScanOptions, Session
 from lidarcore.rplidar.connection.statistics import Statistics, Tally
 from lidarcore.rplidar.protocol import S1_MODES, DeviceInfo, Health, Revolution, ScanMode
 from lidarcore.scan import Scan
+from lidarcore.threads import join
 
 State = Literal["connecting", "streaming", "stalled", "reconnecting", "closed"]
 
@@ -55,7 +56,7 @@ class Driver:
     Entering connects. Leaving stops the motor, as do the end of the program, SIGINT, and SIGTERM and SIGHUP if the
     program (its main thread enters the driver) does not handle them itself: they raise SystemExit.
 
-    Raises DeviceError for wishes that cannot be met, and on entering NoDeviceError, PortPermissionError,
+    Raises DeviceError for a mode or speed that no sensor has, and on entering NoDeviceError, PortPermissionError,
     PortBusyError, NoAnswerError or ProtectionStopError, UnpluggedError.
     """
 
@@ -72,7 +73,7 @@ class Driver:
         list_ports: ListPorts = comports,
     ) -> None:
         self._port = port
-        self._wishes = Wishes(baud, mode, _checked(RPM if rpm is None else rpm))
+        self._options = ScanOptions(baud, mode, _checked(RPM if rpm is None else rpm))
         self._reconnects = reconnect
         self._tap = tap
         self._on_change = on_change
@@ -108,8 +109,7 @@ class Driver:
         forget_at_exit(self.close)
         self._closing.set()
         self._revolutions.close()
-        if self._thread.is_alive() and self._thread is not threading.current_thread():
-            self._thread.join(CLOSING)
+        join(self._thread, CLOSING)
 
     def __iter__(self) -> Iterator[Scan]:
         """Scans as they are completed; the stamp is the Unix time of the first beam, in s."""
@@ -125,7 +125,7 @@ class Driver:
 
     def set_speed(self, rpm: int) -> None:
         """Turn at that speed from now on, 480 to 900 rpm. Raises DeviceError for others."""
-        self._wishes = replace(self._wishes, rpm=_checked(rpm))
+        self._options = replace(self._options, rpm=_checked(rpm))
         self._session.set_speed(rpm)
 
     @property
@@ -156,12 +156,12 @@ class Driver:
     @property
     def rpm(self) -> int:
         """The speed asked for; the one it has is 60 times the statistics' rate."""
-        return self._wishes.rpm
+        return self._options.rpm
 
     @property
     def baud(self) -> int:
         """The baud rate."""
-        return self._wishes.baud
+        return self._options.baud
 
     @property
     def state(self) -> State:
@@ -195,7 +195,7 @@ class Driver:
             ) from error
 
     def _connect(self, path: str) -> Session:
-        session = Session(path, self._wishes, self._tap, self._closing)
+        session = Session(path, self._options, self._tap, self._closing)
         self._tally.begin(session.decoder.statistics)
         return session
 
@@ -248,8 +248,8 @@ class Driver:
             self._on_change()
 
 
-def check_wishes(mode: str | None, rpm: int | None) -> None:
-    """Raises DeviceError for what no S1 can do, also not an emulated one; None is a wish that is always met."""
+def check_scan_options(mode: str | None, rpm: int | None) -> None:
+    """Raises DeviceError for a mode or speed that no S1 has, not even an emulated one; None leaves the choice to it."""
     choose_mode(S1_MODES, None, mode)
     _checked(RPM if rpm is None else rpm)
 

@@ -11,9 +11,9 @@ from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
 from lidarcore.segmentation.ends import place_ends
 from lidarcore.segmentation.merge import merge, surest_corner
+from lidarcore.segmentation.moments import MOMENTS, judge, moments_of
 from lidarcore.segmentation.ring import compact, find_breaks, mean_increment, noise_seen, unroll
 from lidarcore.segmentation.split import split_runs
-from lidarcore.segmentation.sums import SUMS, judge, sums_of
 
 __all__ = ["compact", "find_pieces", "for_pieces", "mean_increment", "noise_seen"]
 
@@ -60,15 +60,15 @@ def find_pieces(
         starts[n_runs] = starts[0] + n
         unroll(points, beams, n, starts[0])
         count = split_runs(points, starts[: n_runs + 1], threshold, noise, scratch, stack, first, last, run)
-        m = np.empty((count + 1, SUMS))
-        sums_of(points, first, last, m, count, trimmed=False)
+        m = np.empty((count + 1, MOMENTS))
+        moments_of(points, first, last, m, count, trimmed=False)
         for p in range(count):
             judge(m[p], noise)
         count = merge(first, last, run, m, count, noise, scratch, indices[4:])
         place_ends(points, first, last, run, m, count, increment, noise)
         if not closed or count < 2:
             return first[:count], last[:count]
-        sums_of(points, first, last, m, count, trimmed=False)
+        moments_of(points, first, last, m, count, trimmed=False)
         for p in range(count):
             judge(m[p], noise)
         # Noise moves the farthest point along its wall: once more from where two walls surely meet.

@@ -7,8 +7,8 @@ and beams of the neighbour bend the line; the bearing at which the lines meet do
 from lidarcore.compiled import inlined
 from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
+from lidarcore.segmentation.moments import line_of, moments_of
 from lidarcore.segmentation.split import variance
-from lidarcore.segmentation.sums import line_of, sums_of
 
 _PASSES = 2  # the lines follow their ends: the first pass takes out most of what is the neighbour's
 _REACH, _REACH_ANGLE = 12, 0.08  # points, and rad, looked at on each side of a common end: whichever is more
@@ -24,12 +24,12 @@ def place_ends(
 ) -> None:  # fmt: skip
     """Move each common end of two neighbours in one run to where their lines meet, or to the likeliest step.
 
-    first, last (count,) are changed in place; so are the sums m (count, SUMS).
+    first, last (count,) are changed in place; so are the moments m (count, MOMENTS).
     increment is the angle between beams, rad.
     """
     reach = max(_REACH, int(_REACH_ANGLE / increment))
     for again in range(_PASSES):
-        sums_of(points, first, last, m, count, trimmed=again == 0)
+        moments_of(points, first, last, m, count, trimmed=again == 0)
         for i in range(count - 1):
             if run[i] == run[i + 1]:
                 last[i] = _common_end(points, first[i], last[i], last[i + 1], m[i], m[i + 1], reach, noise)
@@ -41,7 +41,7 @@ def _common_end(
     points: Array, first: int, end: int, last: int, a: Array, b: Array,
     reach: int, noise: NoiseModel,
 ) -> int:  # fmt: skip
-    """The last point of the first of two pieces (first ... end, end + 1 ... last) with sums a and b.
+    """The last point of the first of two pieces (first ... end, end + 1 ... last) with moments a and b.
 
     It is where the lines meet as seen from the sensor. If some other end near explains the points far better, the
     range steps from one wall to the other without their lines meeting: then it is that end.

@@ -5,7 +5,7 @@ import numpy as np
 from lidarcore.compiled import inlined, kernel
 from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
-from lidarcore.segmentation.sums import CHI2, SQUARES, copy, join, residuals
+from lidarcore.segmentation.moments import CHI2, SQUARES, copy, join, residuals
 
 _MERGE_CHI2 = (
     25.0  # far out for the two or three parameters saved: splits are chosen at extremes, not at random
@@ -25,8 +25,8 @@ def merge(
 ) -> int:
     """Merge neighbours in one run while one line explains both, cheapest first; the number of pieces left.
 
-    first, last, run (count,) and sums m (count, SUMS) are changed in place; cost (count,), chain (2, count) and the
-    row m[count] are scratch.
+    first, last, run (count,) and moments m (count, MOMENTS) are changed in place; cost (count,), chain (2, count) and
+    the row m[count] are scratch.
     """
     joined, before, after = m[count], chain[0], chain[1]
     for i in range(count):

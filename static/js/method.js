@@ -9,7 +9,7 @@ import { capital } from "./units.js";
 const COVARIANCES = {
   consistent: "Exact to first order under the noise model: the fitter's own sensitivity to every point.",
   published:
-    "The formula printed in the method's paper. For CWLF and WCTLS it claims to know more than the data can tell.",
+    "The formula printed in the method's paper. For CWLF and WCTLS its ellipses are too small.",
 };
 
 export function mountMethod() {

@@ -39,7 +39,7 @@ const PLOTS = [
 
 const FILTER_PLOTS = [
   {
-    title: "Squared innovations, normalized (NIS)",
+    title: "Squared innovations, normalised (NIS)",
     series: () => [
       line({ label: "NIS", key: "nis", tone: "--text", read: ofFilter(({ nis, dof }) => dof && nis) }),
     ],

@@ -149,7 +149,7 @@ function draw({ localization: now, timings }, { navigation }, source, connection
   );
 }
 
-/** A known map says nothing of the pose until something of it was recognized. */
+/** A known map says nothing of the pose until something of it was recognised. */
 const isPlaced = (now) => now && !(now.mode === "localize" && now.state === "starting");
 
 const stateText = (now, problem) => (now ? STATES[now.state] : (problem ?? "Waiting for a scan"));

@@ -63,7 +63,7 @@ function make(fields) {
       title("areas-title", "Claimed ellipse areas, mm²"),
       legend({ box: true, last: sign("actual", "area of the scatter") }),
       boxPlot(),
-      el("p", { class: "muted" }, "1σ; each scan's median over its corners. A box to the left of the line claims to know more than is true, one to its right less. Where a few corners are disturbed, the table decides: line and boxes are medians of different things."),
+      el("p", { class: "muted" }, "1σ; each scan's median over its corners. A box to the left of the line claims too small an area (overconfident), one to its right too large an area (cautious). Where a few corners are disturbed, the table decides: line and boxes are medians of different things."),
     ),
     el(
       "section",

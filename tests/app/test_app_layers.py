@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 APP = Path(__file__).parents[2] / "app"
-BASE = {"errors", "isolation", "threads"}
+BASE = {"errors", "isolation"}
 MAY_IMPORT = {
     "errors": set(),
     "isolation": set(),
     "memory": set(),
-    "threads": set(),
     "sources": BASE,
     "pipeline": BASE | {"sources"},
     "scene": BASE | {"sources", "pipeline"},

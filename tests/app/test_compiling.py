@@ -7,11 +7,11 @@ import pytest
 from server_process import server
 from waiting import wait_until
 
-from lidarcore.mapping import ahead
+from lidarcore.mapping import precompile
 
 
 def compiling(process: psutil.Process) -> list[psutil.Process]:
-    return [child for child in process.children() if ahead.__name__ in child.cmdline()]
+    return [child for child in process.children() if precompile.__name__ in child.cmdline()]
 
 
 @pytest.mark.long

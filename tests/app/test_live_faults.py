@@ -142,5 +142,5 @@ def test_what_fails_beside_does_not_end_the_view(
     source.start(lambda: None, lambda: None)
     wait_until(lambda: source.count >= 4)
     source.close()
-    told = [record for record in caplog.records if record.name == "lidarcore_app.threads"]
+    told = [record for record in caplog.records if record.name == "lidarcore.threads"]
     assert [record.exc_text.splitlines()[-1] for record in told] == ["OSError: the disk is full"]

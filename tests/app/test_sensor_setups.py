@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lidarcore_app.jobs.sensor_memory import MOST, SensorMemory
-from lidarcore_app.pipeline.noise_watch import SCANS
+from lidarcore_app.pipeline.noise_check import SCANS
 from lidarcore_app.pipeline.sensor_setups import SensorSetup, SensorSetups
 from lidarcore_app.sources.live import DeviceOptions
 from lidarcore_app.sources.recorded import RecordingSource

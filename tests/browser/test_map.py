@@ -16,7 +16,7 @@ from waiting import wait_until
 
 from lidarcore.mapping.grid import OccupancyGrid, read_ros_map, write_ros_map
 
-FEW = 8  # landmarks that a furnished room has soon; with fewer than half of what is in view it is not recognized
+FEW = 8  # landmarks that a furnished room has soon; with fewer than half of what is in view it is not recognised
 MAPPED = range(60, 75)  # scans of the real recording that are mapped, one after the other
 Row = dict[str, Any]
 
@@ -32,9 +32,9 @@ def found_in(server: Server) -> str:
 
 
 def slam(server: Server) -> None:
-    """A map of its own is built, and some landmarks of it are recognized."""
+    """A map of its own is built, and some landmarks of it are recognised."""
     server.patch("settings", {"navigation": {"mode": "slam", "method": "landmarks", "landmarks": "corners"}})
-    wait_until(lambda: recognized(server) >= FEW, "there are landmarks")
+    wait_until(lambda: recognised(server) >= FEW, "there are landmarks")
 
 
 def map_recording(visitor: Visitor) -> dict:
@@ -58,7 +58,7 @@ def is_mapped(server: Server, index: int) -> bool:
     )
 
 
-def recognized(server: Server) -> int:
+def recognised(server: Server) -> int:
     """How many landmarks on the disk are in the newest frame."""
     pairs = (server.get("frame")["localization"] or {"innovations": []})["innovations"]
     return len({row["id"] for row in landmarks(server)} & {pair["landmark"] for pair in pairs})
@@ -288,7 +288,7 @@ def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
     page.get_by_role("button", name="Localize in it").click()
     wait_until(lambda: server.get("localization")["session"] not in (None, session), "it is the map in use")
     loaded = server.get("localization")["session"]
-    wait_until(lambda: found_in(server) == "localize, tracking", "the room is recognized")
+    wait_until(lambda: found_in(server) == "localize, tracking", "the room is recognised")
     expect(page.locator("#pose-panel-state")).to_have_text("Tracking")
     assert server.get("settings")["navigation"]["mode"] == "localize"
     assert {(row["x"], row["y"]) for row in landmarks(server)} == {(row["x"], row["y"]) for row in kept}

@@ -12,7 +12,7 @@ from lidarcore.clusters import CLUSTERERS, ClusterSettings, cluster
 
 noises = pytest.mark.parametrize("noise", [SensorNoise(0.01, 0.001), SensorNoise(0.02, 0.0034)], ids=str)
 EXACT = SensorNoise(1e-6, 1e-7)
-TAIL = 1e-4  # one false alarm in ten thousand for each tail of each figure
+TAIL = 1e-8  # of either tail of each figure: of all of them, one false alarm in a million
 
 
 def normalised(error, covariance):

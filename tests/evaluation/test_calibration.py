@@ -8,6 +8,7 @@ from itertools import groupby, islice, pairwise
 
 import numpy as np
 import pytest
+from chance import fewest
 from lidarcore_app.cli.main import cli
 from lidarcore_app.cli.options import settings_from
 from lidarcore_app.jobs.calibration_report import report
@@ -70,8 +71,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
         result = variance_model(variances, dof, lever2, lever2, 1)
         held += [result.sigmas[0].contains(0.01), result.slope.contains(0.003)]
     print(held / repeats)
-    assert (held > 0.9 * repeats).all()
-    assert (held < 0.985 * repeats).all()
+    assert (held >= fewest(repeats, 0.95)).all()  # intervals that hold 0.8 would be caught
+    assert (held < repeats).all()  # as of endless ones; of those that hold 0.95 once in five million times
 
 
 def test_noise_that_grows_with_range_is_seen_in_the_bands():

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from chance import fewest
 from lidarcore_app.cli.main import cli
 from typer.testing import CliRunner
 
@@ -20,7 +21,7 @@ NOISE = SensorNoise(0.002, 0.001)
 
 
 def test_ellipses_hold_the_walls_where_they_truly_are_and_nowhere_else():
-    """About 400 walls and 150 corners: a share of 0.95 is below 0.88 with a probability below 1e-4."""
+    """About 400 walls and 150 corners; ellipses of half the area, which hold 0.78, would be caught."""
     rng, sensor = np.random.default_rng(1), SimulatedSensor(furnished_room(), NOISE)
     shifted = World(sensor.world.walls + np.array([0.03, 0.03]))
     here, there = np.zeros((2, 2)), np.zeros((2, 2))
@@ -32,7 +33,7 @@ def test_ellipses_hold_the_walls_where_they_truly_are_and_nowhere_else():
         there += held(features, hit, shifted, pose)
     print(here, there)
     assert (here[:, 1] > 100).all()
-    assert (here[:, 0] > 0.88 * here[:, 1]).all()
+    assert all(hits >= fewest(int(of), 0.95) for hits, of in here)
     assert (there[:, 0] < 0.1 * there[:, 1]).all()
 
 
@@ -58,7 +59,7 @@ def test_the_command_prints_and_writes_every_part(tmp_path):
 def test_points_that_average_over_a_piece_of_wall_do_not_make_it_smoother():
     """30 walls of 4 mm over 8 cm, in pieces of 8 cm, whose means have 0.86 of the deviation.
 
-    The size is known to 2.7 %: it is off by 10 % with a probability of 2e-4.
+    The size is known to 2.7 %: it is off by 14 %, as it would be if a piece counted as a point, once in five million.
     """
     found = []
     walls = np.tile([[0.0, 0.0], [6.0, 0.0]], (30, 1, 1))
@@ -70,7 +71,7 @@ def test_points_that_average_over_a_piece_of_wall_do_not_make_it_smoother():
         found.append(Profile(t, off.mean(1), np.full(74, 0.08), np.full(74, 1e-10)))
     size, length = unevenness(found, np.random.default_rng(0))
     print(size, length)
-    assert abs(size.value / 0.004 - 1) < 0.1
+    assert abs(size.value / 0.004 - 1) < 0.14
     assert 0.05 < length.value < 0.13
 
 

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import binomtest, chi2, ncx2
+from chance import band
+from scipy.stats import chi2, ncx2
 
 from lidarcore import ExtractionSettings, SensorNoise
 from lidarcore.errors import EvaluationError
@@ -168,8 +169,9 @@ def test_confidence_intervals_hold_the_truth_as_often_as_they_say():
         held["share"] += share(rng.binomial(n.astype(int), p).astype(float), n).contains(0.8)
     print(held)
     for name, count in held.items():
-        low, high = binomtest(count, repeats).proportion_ci(0.999)
-        assert low <= 0.95 <= high + 0.01, name
+        # Student's t and Wilson's intervals are approximations here, to a hundredth.
+        assert abs(count / repeats - 0.95) < band(0.95, repeats) + 0.01, name
+        assert count < repeats, name
 
 
 def test_a_share_of_none_or_all_still_has_an_interval():

@@ -24,7 +24,7 @@ from lidarcore.evaluation.intervals import Interval
 DESIGN = Design(
     rooms=("4.5x2.5", "corridor"),
     noises=(SensorNoise(0.02, 0.001), SensorNoise(0.05, 0.0034)),
-    trials=4000, blocks=4, beams=360, seed=5,
+    trials=640, blocks=4, beams=360, seed=5,
 )  # fmt: skip
 COLUMNS = {
     "found": 1, "bias": 1e3, "rms": 1e3, "rms_ratio": 1, "coverage_50": 1, "coverage_95": 1, "coverage_99": 1,

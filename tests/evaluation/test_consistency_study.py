@@ -42,6 +42,7 @@ def test_results_do_not_depend_on_the_number_of_workers(uninterrupted):
     assert (study(DESIGN, workers=2).sums == uninterrupted.sums).all()
 
 
+@pytest.mark.long
 def test_results_do_not_depend_on_where_dask_runs_them(uninterrupted):
     with LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=None

@@ -4,6 +4,8 @@ import json
 from dataclasses import replace
 
 import numpy as np
+from chance import SURE, fewest
+from chance import band as sure_band
 from lidarcore_app.cli.main import cli
 from scipy.stats import chi2
 from typer.testing import CliRunner
@@ -21,16 +23,16 @@ def squares(of: float, runs: int = 60) -> list[np.ndarray]:
 
 
 def test_true_claims_are_found_true_and_others_are_not():
-    """2,460 draws: their share within 95 % has a standard deviation of .004; of 42 steps all but 2 lie in the band."""
+    """2,460 draws, whose mean square has a relative standard deviation of .0165; of 42 steps 2 lie outside the band."""
     true = judged(squares(1))
-    assert abs(true.coverage.value - 0.95) < 0.02
-    assert abs(true.anees.value - 1) < 0.06
+    assert abs(true.coverage.value - 0.95) < sure_band(0.95, 2460)
+    assert abs(true.anees.value - 1) < SURE * 0.0165
     assert abs(true.median - chi2.median(3)) < 0.2
-    assert true.steps > 0.8
+    assert true.steps * 42 >= fewest(42, 0.95)
     for of, shares in ((0.7, (0.98, 1)), (1.4, (0.6, 0.9))):
         wrong = judged(squares(of))
         assert shares[0] < wrong.coverage.value < shares[1]
-        assert abs(wrong.anees.value / of**2 - 1) < 0.06
+        assert abs(wrong.anees.value / of**2 - 1) < SURE * 0.0165
         assert wrong.steps < 0.1
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from chance import holds
 from scipy.stats import chi2
 from walks import (
     PERIOD,
@@ -101,6 +102,6 @@ def test_without_odometry_the_covariance_is_what_the_errors_show_from_the_first_
     rng = np.random.default_rng(11)
     errors = np.array([float_and_map(rng) for _ in range(FREE_RUNS)])
     inside = mean((errors < chi2.ppf(0.95, 3)).mean(axis=1))
-    assert inside.contains(0.95), inside
+    assert holds(inside, 0.95), inside
     assert inside.half_width < 0.05, inside
     assert np.mean(errors[:, -1] > chi2.ppf(1 - 1e-9, 3)) <= 0.05, "runs that have lost their way"

@@ -17,7 +17,7 @@ from waiting import soonest, wait_until
 
 from lidarcore.errors import DeviceError, NoAnswerError, NoDeviceError, PortBusyError
 from lidarcore.rplidar import Driver
-from lidarcore.rplidar.driver import check_wishes
+from lidarcore.rplidar.driver import check_scan_options
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.rplidar.protocol import S1_MODES, StreamDecoder
 
@@ -218,22 +218,22 @@ def test_a_port_in_use_is_busy_and_its_user_undisturbed(sensor: EmulatorProcess)
         assert all(revolution.complete for revolution in islice(revolutions, 5))
 
 
-def test_wishes_that_cannot_be_met_are_refused() -> None:
+def test_scan_options_that_no_sensor_has_are_refused() -> None:
     with pytest.raises(DeviceError, match="choose 480 to 900"):
         Driver("/dev/ttyUSB0", rpm=60)
     with pytest.raises(NoDeviceError, match="no port /dev/ttyUSB99"):
         Driver("/dev/ttyUSB99").__enter__()
     with pytest.raises(DeviceError, match="no mode Turbo: take Standard or DenseBoost"):
-        check_wishes("Turbo", None)
+        check_scan_options("Turbo", None)
     with pytest.raises(DeviceError, match="choose 480 to 900"):
-        check_wishes("DenseBoost", 901)
-    check_wishes(None, None)
-    check_wishes("standard", 480)
+        check_scan_options("DenseBoost", 901)
+    check_scan_options(None, None)
+    check_scan_options("standard", 480)
 
 
 @pytest.mark.long
 def test_the_right_baud_rate_is_named_where_the_wrong_one_was_given(sensor: EmulatorProcess) -> None:
-    with pytest.raises(NoAnswerError, match="talks at 256000 baud, not at 115200"):
+    with pytest.raises(NoAnswerError, match="uses 256000 baud, not 115200: choose that rate"):
         Driver(sensor.port, baud=115_200).__enter__()
     with Driver(sensor.port) as driver:
         next(iter(driver))

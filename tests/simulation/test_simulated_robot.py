@@ -93,16 +93,16 @@ def test_odometry_errs_as_stated() -> None:
     moved = way + turn > 1e-6
     normal = error[moved] / np.sqrt(variance[moved])
     n = len(normal)
-    band = norm.isf(1e-5)
+    band = norm.isf(1e-8)
     assert np.abs(normal.mean(axis=0)).max() < band / np.sqrt(n)
-    low, high = chi2.ppf([1e-5, 1 - 1e-5], n) / n
+    low, high = chi2.ppf([1e-8, 1 - 1e-8], n) / n
     assert ((normal**2).mean(axis=0) > low).all()
     assert ((normal**2).mean(axis=0) < high).all()
     products = [normal[:, 0] * normal[:, 1], normal[:, 0] * normal[:, 2], normal[1:, 2] * normal[:-1, 2]]
     assert max(abs(product.mean()) for product in products) < band / np.sqrt(n - 1)
     turning, driving = turn[moved] > 0.02, turn[moved] < 1e-3
     for part in (normal[turning], normal[driving]):
-        low, high = chi2.ppf([1e-5, 1 - 1e-5], part.size) / part.size
+        low, high = chi2.ppf([1e-8, 1 - 1e-8], part.size) / part.size
         assert low < (part**2).mean() < high
 
 
@@ -114,7 +114,7 @@ def test_errors_over_twenty_metres_are_those_of_a_random_walk() -> None:
         last = scans(230, world="field", path="straight", field_of_view=NARROW, seed=seed)[-1]
         ends.append(last.odometry - last.truth)
     noise = OdometryNoise()
-    low, high = np.sqrt(chi2.ppf([1e-4, 1 - 1e-4], 60) / 60)
+    low, high = np.sqrt(chi2.ppf([1e-7, 1 - 1e-7], 60) / 60)
     heading = np.sqrt((np.array(ends)[:, 2] ** 2).mean()) / (noise.heading_per_metre * np.sqrt(20))
     assert low < heading < high
     # Sideways: the integral of the heading's random walk, 20^3 / 3, and the steps' own errors.

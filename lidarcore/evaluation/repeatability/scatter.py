@@ -18,8 +18,8 @@ from lidarcore.scan import Array, Ints
 
 LEAST = 10
 """A corner or wall seen fewer times is not judged."""
-SIGHTING = 10
-"""Numbers of a sighting: x, y of a corner or alpha, r of a wall; published (4), consistent (4)."""
+OBSERVATION = 10
+"""Numbers of an observation: x, y of a corner or alpha, r of a wall; published (4), consistent (4)."""
 
 Mask = NDArray[np.bool_]
 Item = TypeVar("Item")
@@ -27,9 +27,10 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations:
-    """R sightings of features, all corners or all walls; for `scatter` sorted by feature and then by scan.
+    """R observations of features, all corners or all walls; for `scatter` sorted by feature and then by scan.
 
-    ids, scans (R,); table (R, M, SIGHTING) for M methods, NaN where a method did not find the feature; (R, 2) of one.
+    ids, scans (R,); table (R, M, OBSERVATION) for M methods, NaN where a method did not find the feature; (R, 2) of
+    one method.
     """
 
     ids: Ints
@@ -42,7 +43,7 @@ class Observations:
         return np.flatnonzero(np.diff(self.ids, prepend=-1))
 
     def without(self, n: int) -> "Observations":
-        """All but the first n sightings."""
+        """All but the first n observations."""
         return Observations(self.ids[n:], self.scans[n:], self.table[n:])
 
     def followed_by(self, other: "Observations") -> "Observations":
@@ -58,9 +59,9 @@ class Observations:
 class Scatter:
     """Figures of K features and M methods; claims of both KINDS.
 
-    ids (K,); counts (K, M); means (K, M, SIGHTING) of positions and covariances; squares (K, M, 3) the sums of xx, xy
-    and yy about the mean; hits (K, M, 2, 3) residuals within the ellipses of GATES; scan_hits (N, M, 2, 3) and
-    scan_counts (N, M) the same by scan.
+    ids (K,); counts (K, M); means (K, M, OBSERVATION) of positions and covariances; squares (K, M, 3) the sums of xx,
+    xy and yy about the mean; hits (K, M, 2, 3) residuals within the ellipses of GATES; scan_hits (N, M, 2, 3) and
+    scan_counts (N, M) hits and counts of each scan.
     """
 
     ids: Ints
@@ -167,15 +168,15 @@ def _batched(items: Iterable[Item], n: int) -> Iterator[tuple[Item, ...]]:
 _TAILS = ((1 + LEVEL) / 2, (1 - LEVEL) / 2)  # upper ones, of the lower end and of the upper
 
 
-def scatter(sightings: Observations, scans: int) -> Scatter:
+def scatter(observations: Observations, scans: int) -> Scatter:
     """What `scans` scans say.
 
     A residual from the mean of n scans has the covariance (1 - 1/n) C, not C: the mean follows each of its own points.
     Divided by that factor, its squared Mahalanobis distance is chi-square as that of a true error is. No law of
     Hotelling's is needed: the claim C is not estimated from the scatter.
     """
-    table, starts = np.ascontiguousarray(np.moveaxis(sightings.table, 0, -1)), sightings.starts
-    feature = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(sightings.ids)))
+    table, starts = np.ascontiguousarray(np.moveaxis(observations.table, 0, -1)), observations.starts
+    feature = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(observations.ids)))
     seen: Mask = np.isfinite(table[:, 0])  # (M, R); sums are quickest along the last axis
     counts = _sums(seen.astype(np.float64), starts)
     means = _sums(np.where(seen[:, None], table, 0.0), starts) / np.maximum(counts, 1)[:, None]
@@ -187,9 +188,9 @@ def scatter(sightings: Observations, scans: int) -> Scatter:
     )
     judged = seen & (counts >= LEAST)[:, feature]
     hits = _tally(nees, judged, feature, len(starts))
-    scan_hits = _tally(nees, judged, sightings.scans, scans)
+    scan_hits = _tally(nees, judged, observations.scans, scans)
     return Scatter(
-        sightings.ids[starts],
+        observations.ids[starts],
         counts.T,
         np.moveaxis(means, -1, 0),
         np.moveaxis(_sums(squares, starts), -1, 0),
@@ -212,12 +213,12 @@ def _tally(nees: Array, judged: Mask, groups: Ints, n: int) -> Array:
 
 
 def one_sigma_areas(table: Array) -> Array:
-    """(..., 2) areas of the claimed one-sigma ellipses of sightings (..., SIGHTING), by KINDS."""
+    """(..., 2) areas of the claimed one-sigma ellipses of observations (..., OBSERVATION), by KINDS."""
     return np.pi * _root_det(covariances(table))
 
 
 def covariances(table: Array) -> Array:
-    """(..., 2, 4) claimed of sightings (..., SIGHTING), by KINDS."""
+    """(..., 2, 4) claimed of observations (..., OBSERVATION), by KINDS."""
     return table[..., 2:].reshape(*table.shape[:-1], len(KINDS), 4)
 
 

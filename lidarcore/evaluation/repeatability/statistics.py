@@ -12,10 +12,10 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.repeatability.scatter import LEAST
-from lidarcore.evaluation.repeatability.sighted import Sighted
 from lidarcore.evaluation.repeatability.standstill import moves
 from lidarcore.evaluation.repeatability.summary import CornerMethod, Summary, WallMethod, WallSummary
 from lidarcore.evaluation.repeatability.wall_tracker import WallRow, WallTracker, told_near
+from lidarcore.evaluation.repeatability.window import FeatureWindow
 from lidarcore.features import Features
 from lidarcore.geometry import unit_vectors
 from lidarcore.lines import FITTERS
@@ -43,7 +43,7 @@ class Repeatability:
             raise EvaluationError(f"Unknown methods {unknown}: choose from {', '.join(FITTERS)}.")
         if not self.methods:
             raise EvaluationError(f"No method is given: choose from {', '.join(FITTERS)}.")
-        self.corners, self.walls = (Sighted(window, self.methods, noun) for noun in ("corner", "wall"))
+        self.corners, self.walls = (FeatureWindow(window, self.methods, noun) for noun in ("corner", "wall"))
         self._corner_tracker = Tracker(memory=window, follow=_FOLLOW)
         self._wall_tracker = WallTracker(memory=window, follow=_FOLLOW)
         self._moved = False
@@ -79,7 +79,7 @@ class Repeatability:
             self._watch()
 
     def _table(self, rows: Sequence[CornerRow | WallRow], seen: Sequence[Array]) -> Array:
-        """(K, M, SIGHTING) of the rows, NaN where a method has none, from what each method saw (N, SIGHTING)."""
+        """(K, M, OBSERVATION) of the rows, NaN where a method has none, from what each method saw (N, OBSERVATION)."""
         index = np.array([[row.index.get(name, -1) for name in self.methods] for row in rows], np.int64)
         index = index.reshape(-1, len(self.methods))
         begin = np.cumsum([0, *(len(found) for found in seen[:-1])])
@@ -137,11 +137,11 @@ class Repeatability:
             return None
         scans = len(self)
         ago = f"{scans} scan{'s' * (scans > 1)} ago" if scans else "just now"
-        return f"The sensor moved {ago}: the window began anew."
+        return f"The sensor moved {ago}: the window was started again."
 
 
 def _corners_seen(found: Features) -> Array:
-    """(K, SIGHTING)"""
+    """(K, OBSERVATION)"""
     corners = found.corners
     published, consistent = (
         c.reshape(-1, 4) for c in (corners.covariance_published, corners.covariance_consistent)
@@ -150,7 +150,7 @@ def _corners_seen(found: Features) -> Array:
 
 
 def _walls_seen(found: Features) -> Array:
-    """(M, SIGHTING)"""
+    """(M, OBSERVATION)"""
     lines = found.lines
     published, consistent = (
         c.reshape(-1, 4) for c in (lines.covariance_published, lines.covariance_consistent)

@@ -11,7 +11,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.evaluation.consistency.figures import GATES, LEVELS, Mask
-from lidarcore.evaluation.repeatability.looks import Look, moved, moved_ends
+from lidarcore.evaluation.repeatability.feature_set import FeatureSet, moved, moved_ends
 from lidarcore.evaluation.repeatability.wall_tracker import shared_extents, unwrapped
 from lidarcore.geometry import act, act_jacobians, squared_mahalanobis
 
@@ -26,10 +26,10 @@ _HALVINGS = 16  # to a micrometre or two
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pair:
-    """Two looks at the same walls, and about how they lie: T_first_second (3,)."""
+    """Features of two scans of the same walls, and roughly the relative pose of the scans: T_first_second (3,)."""
 
-    first: Look
-    second: Look
+    first: FeatureSet
+    second: FeatureSet
     pose: Array
 
 
@@ -49,40 +49,40 @@ def differences(pair: Pair, sigma: float = 0.0) -> Differences:
     claim: the pose takes no degree of freedom away unseen. What the others do not tell well enough is left out, as
     claims without a systematic part have it, so that the same differences are judged whatever sigma is.
     """
-    laid = _Laid.of(pair)
-    return Differences(laid.walls(sigma), laid.corners(sigma))
+    registered = _RegisteredPair.of(pair)
+    return Differences(registered.walls(sigma), registered.corners(sigma))
 
 
 def systematic_part(groups: Sequence[Sequence[Pair]]) -> float:
     """The systematic part (m) with which 95 % ellipses hold 95 % of the differences of walls.
 
-    groups: pairs of looks from the same two places each; every group counts the same.
+    groups: pairs of scans from the same two places each; every group counts the same.
     """
-    laid = [[_Laid.of(pair) for pair in group] for group in groups]
+    registered = [[_RegisteredPair.of(pair) for pair in group] for group in groups]
     low, high = 0.0, _MOST
-    if _coverage(laid, low) >= 0.95:
+    if _coverage(registered, low) >= 0.95:
         return low
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
-        low, high = (low, middle) if _coverage(laid, middle) >= 0.95 else (middle, high)
+        low, high = (low, middle) if _coverage(registered, middle) >= 0.95 else (middle, high)
     return high
 
 
 def coverage(groups: Sequence[Sequence[Pair]], sigma: float) -> float:
     """Share of the walls' differences in the 95 % ellipses, with a systematic part of sigma m."""
-    return _coverage([[_Laid.of(pair) for pair in group] for group in groups], sigma)
+    return _coverage([[_RegisteredPair.of(pair) for pair in group] for group in groups], sigma)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Laid:
-    """A pair at the relative pose that its walls tell: which walls (N, 2) match, and those that the others tell."""
+class _RegisteredPair:
+    """A pair at the relative pose that its walls tell; which walls (N, 2) match, and which of them the others tell."""
 
     pair: Pair
     matches: Ints
     told: list[int]
 
     @classmethod
-    def of(cls, pair: Pair) -> "_Laid":
+    def of(cls, pair: Pair) -> "_RegisteredPair":
         pose, matches = _registered(pair)
         walls = _Walls.at(pair, matches, pose)
         told = [i for i in range(len(matches)) if walls.is_told(i)]
@@ -94,19 +94,19 @@ class _Laid:
         return np.array([walls.distance(i) for i in self.told])
 
     def corners(self, sigma: float) -> Array:
-        """The same of the corners."""
+        """Squared Mahalanobis distances of the corners with a systematic part of sigma m."""
         claimed = self._claimed(sigma)
         walls = _Walls.at(claimed, self.matches, self.pair.pose)
         found = (_corner_distance(claimed, walls, self.matches, k) for k in range(len(claimed.first.corners)))
         return np.array([distance for distance in found if distance is not None])
 
     def _claimed(self, sigma: float) -> Pair:
-        first, second = (look.with_systematic(sigma) for look in (self.pair.first, self.pair.second))
+        first, second = (features.with_systematic(sigma) for features in (self.pair.first, self.pair.second))
         return Pair(first, second, self.pair.pose)
 
 
-def _coverage(groups: Sequence[Sequence[_Laid]], sigma: float) -> float:
-    held = [np.concatenate([laid.walls(sigma) for laid in group]) <= GATE for group in groups]
+def _coverage(groups: Sequence[Sequence[_RegisteredPair]], sigma: float) -> float:
+    held = [np.concatenate([registered.walls(sigma) for registered in group]) <= GATE for group in groups]
     return float(np.mean([share.mean() for share in held if len(share)]))
 
 
@@ -120,7 +120,7 @@ class _Walls:
 
     @classmethod
     def at(cls, pair: Pair, matches: Ints, pose: Array) -> "_Walls":
-        """Those matched (N, 2), the second look's laid at T_first_second (3,)."""
+        """The matched walls (N, 2), those of the second scan moved by T_first_second (3,)."""
         a, b = matches.T
         there, J, F = moved(pair.second.lines[b], pose)
         here = np.column_stack(unwrapped(pair.first.lines[a], there[:, 0]))
@@ -135,7 +135,7 @@ class _Walls:
         return P @ (weighted @ self.e[of][..., None]).sum(0)[:, 0], P
 
     def but(self, i: int) -> Mask:
-        """All others."""
+        """All walls but this one."""
         others: Mask = np.arange(len(self.e)) != i
         return others
 
@@ -189,7 +189,10 @@ def _registered(pair: Pair) -> tuple[Array, Ints]:
 
 
 def _corner_distance(pair: Pair, walls: _Walls, matches: Ints, k: int) -> float | None:
-    """The same of a corner of the first look; None where the second has none there, or the walls do not tell it."""
+    """Squared Mahalanobis distance of corner k of the first scan from where the second scan and the pose have it.
+
+    None where the second scan has none there, or the walls do not tell it.
+    """
     step, P = walls.correction(~np.isin(matches[:, 0], pair.first.walls[k]))
     pose = pair.pose + step
     if not len(pair.second.corners):

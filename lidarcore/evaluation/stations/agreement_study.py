@@ -9,19 +9,19 @@ import numpy as np
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.intervals import Interval, share
-from lidarcore.evaluation.repeatability.looks import Look
+from lidarcore.evaluation.repeatability.feature_set import FeatureSet
 from lidarcore.evaluation.stations.agreement import GATE, Differences, Pair, differences, systematic_part
 from lidarcore.extraction import extract
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.correlative import search
-from lidarcore.mapping.laying import Laid, information_of, lay
 from lidarcore.mapping.patches import patches
+from lidarcore.mapping.registration import Registration, information_of, register
 from lidarcore.mapping.surfels import surfels
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Scan
 from lidarcore.settings import Covariance, ExtractionSettings
 
-LOOKS = 20  # scans from each station, each paired with one from the next
+SCANS = 20  # scans from each station, each paired with one from the next
 _APART = np.array([0.3, 0.3, 0.2])  # m, rad: standard deviation of neighbouring stations
 _INLIERS = 0.5  # share of a scan that must lie on the other, for the stations to be neighbours
 _LEAST_PAIRS = 2
@@ -94,30 +94,31 @@ def study(
 class _Station:
     name: str
     middle: Scan
-    looks: dict[Covariance, list[Look]]
+    feature_sets: dict[Covariance, list[FeatureSet]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Group:
-    """Pairs of looks from two stations, with either claim."""
+    """Pairs of scans from two stations, with either claim."""
 
     consistent: list[Pair]
     map: list[Pair]
 
 
 def _prepared(name: str, scans: Sequence[Scan], settings: ExtractionSettings, calibrated: bool) -> _Station:
-    """Looks from the second half of the scans, spread over it."""
+    """A station with the features of scans spread over the second half of its scans."""
     half = len(scans) // 2
     noise = settings.noise
     if calibrated:
         noise = _calibrated(scans[:half], noise)
     chosen = replace(settings, noise=noise)
-    at = np.linspace(half, len(scans) - 1, LOOKS).astype(int).tolist()
+    at = np.linspace(half, len(scans) - 1, SCANS).astype(int).tolist()
     kinds: tuple[Covariance, ...] = ("consistent", "map")
-    looks = {
-        kind: [Look.of(extract(scans[i], replace(chosen, covariance=kind))) for i in at] for kind in kinds
+    feature_sets = {
+        kind: [FeatureSet.of(extract(scans[i], replace(chosen, covariance=kind))) for i in at]
+        for kind in kinds
     }
-    return _Station(name, scans[half], looks)
+    return _Station(name, scans[half], feature_sets)
 
 
 def _calibrated(scans: Sequence[Scan], usual: SensorNoise) -> SensorNoise:
@@ -128,24 +129,27 @@ def _calibrated(scans: Sequence[Scan], usual: SensorNoise) -> SensorNoise:
 
 
 def _pairs(first: _Station, second: _Station) -> _Group | None:
-    """Looks from both, one by one; None if the stations do not lie on each other."""
-    laid = _laid(first.middle, second.middle)
-    if laid.inliers < _INLIERS:
+    """Pairs of scans from both stations, one by one; None if the stations do not lie on each other."""
+    registered = _registered(first.middle, second.middle)
+    if registered.inliers < _INLIERS:
         return None
     consistent, for_maps = (
-        [Pair(a, b, laid.pose) for a, b in zip(first.looks[kind], second.looks[kind], strict=True)]
-        for kind in first.looks
+        [
+            Pair(a, b, registered.pose)
+            for a, b in zip(first.feature_sets[kind], second.feature_sets[kind], strict=True)
+        ]
+        for kind in first.feature_sets
     )
     return _Group(consistent, for_maps)
 
 
-def _laid(reference: Scan, scan: Scan) -> Laid:
+def _registered(reference: Scan, scan: Scan) -> Registration:
     """How a scan lies on one that was taken nearby."""
     settings, nowhere = MatchSettings(), np.zeros(3)
     A, B = patches(reference, settings), patches(scan, settings)
     start = search(A.means, B.means, nowhere, _APART, settings)
     elements = surfels([A], nowhere[None], settings.patch, settings.reach)
-    return lay(elements, B, start, nowhere, information_of(np.diag(_APART**2)), settings.reach)
+    return register(elements, B, start, nowhere, information_of(np.diag(_APART**2)), settings.reach)
 
 
 def _judged(names: list[str], groups: list[list[Pair]], parts: tuple[float, ...]) -> Agreement:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from lidarcore.mapping.grid.occupancy import Mask
-from lidarcore.mapping.walls.sightings import Sightings, common
+from lidarcore.mapping.walls.observations import Observations, common
 from lidarcore.mapping.walls.walls import Walls
 
 _MOST = 0.5  # share of what was seen of a wall from which on that is the wall
@@ -22,14 +22,14 @@ class WallIds:
     """
 
     def __init__(self) -> None:
-        self._known = Sightings.none()  # of walls by their ids, as they were when last there
+        self._known = Observations.none()  # of walls by their ids, as they were when last there
         self._last: Walls | None = None
         self._next = 0
 
     def identified(self, walls: Walls) -> Walls:
         """The walls of all keyframes so far, found with the same settings as those before, with their ids."""
         known, of = np.unique(self._known.wall, return_inverse=True)
-        tied = _same(replace(self._known, wall=of), walls.sightings, (len(known), len(walls)))
+        tied = _same(replace(self._known, wall=of), walls.observations, (len(known), len(walls)))
         away = ~tied.any(axis=1)
         if self._last is not None:
             gone = np.isin(self._last.ids, known[away])
@@ -43,12 +43,12 @@ class WallIds:
         ids[new] = self._next + np.arange(len(new))
         self._next += len(new)
         kept = self._known.where(np.isin(self._known.wall, known[~tied.any(axis=1)]))
-        self._known = Sightings.joined([kept, walls.sightings.renamed(ids)])
+        self._known = Observations.joined([kept, walls.observations.renamed(ids)])
         self._last = replace(walls, ids=ids)
         return self._last
 
 
-def _same(before: Sightings, now: Sightings, shape: tuple[int, int]) -> Mask:
+def _same(before: Observations, now: Observations, shape: tuple[int, int]) -> Mask:
     """Which walls before and now (B, N) have most of either in common, as far as both could see it."""
     shared = common(before, now, shape).toarray()
     then = now.where(now.segment <= before.segment.max(initial=-1))

@@ -11,7 +11,7 @@ from scipy.sparse import block_diag, coo_array, csr_array
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.mapping.walls.ends import End
-from lidarcore.mapping.walls.meetings import Meetings
+from lidarcore.mapping.walls.intersections import Intersections
 from lidarcore.mapping.walls.parts import Part
 from lidarcore.mapping.walls.pieces import Pieces
 from lidarcore.mapping.walls.spread import Spread
@@ -73,14 +73,14 @@ def wall_model(
     pieces: Pieces,
     parts: list[Part],
     ends: list[tuple[End, End]],
-    meetings: Meetings,
+    intersections: Intersections,
     spread: Spread,
     keyframes: int,
     systematic: float,
 ) -> WallModel:
     """Of walls with their own ends, of which those in corners are replaced; systematic (m) is SensorNoise's."""
     blocks = [_noise(part, pair, systematic) for part, pair in zip(parts, ends, strict=True)]
-    rows = _line_rows(parts) + _end_rows(parts, ends, meetings)
+    rows = _line_rows(parts) + _end_rows(parts, ends, intersections)
     noise = csr_array(block_diag(blocks, format="csr")) if blocks else csr_array((0, 0))
     return WallModel(rows, _gain(pieces, parts, ends, keyframes), noise, spread)
 
@@ -134,10 +134,10 @@ def _line_rows(parts: list[Part]) -> csr_array:
     )
 
 
-def _end_rows(parts: list[Part], ends: list[tuple[End, End]], meetings: Meetings) -> csr_array:
+def _end_rows(parts: list[Part], ends: list[tuple[End, End]], intersections: Intersections) -> csr_array:
     shape = (_ROWS * len(parts), _STATE * len(parts))
     total = csr_array(shape)
-    met = {(int(i), int(side)) for (i, _), side in zip(meetings.walls, meetings.side, strict=True)}
+    met = {(int(i), int(side)) for (i, _), side in zip(intersections.walls, intersections.side, strict=True)}
     data, rows, columns = [], [], []
     for i, part in enumerate(parts):
         for side in (0, 1):
@@ -153,7 +153,7 @@ def _end_rows(parts: list[Part], ends: list[tuple[End, End]], meetings: Meetings
             data.append(moved.ravel())
             rows.append(row.ravel())
             columns.append(column.ravel())
-    for (i, j), side, xy in zip(meetings.walls, meetings.side, meetings.xy, strict=True):
+    for (i, j), side, xy in zip(intersections.walls, intersections.side, intersections.xy, strict=True):
         corner = corner_rows(parts, int(i), int(j), xy).tocoo()
         data.append(corner.data)
         rows.append(corner.coords[0] + _ROWS * i + 2 + 2 * side)

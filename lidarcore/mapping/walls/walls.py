@@ -11,12 +11,12 @@ from lidarcore.geometry import wrap
 from lidarcore.mapping.grid.occupancy import OccupancyGrid
 from lidarcore.mapping.walls.ends import find_end
 from lidarcore.mapping.walls.grouping import group_pieces
-from lidarcore.mapping.walls.meetings import Meetings, find_meetings
+from lidarcore.mapping.walls.intersections import Intersections, find_intersections
 from lidarcore.mapping.walls.model import WallModel, corner_rows, wall_model
+from lidarcore.mapping.walls.observations import Observations
 from lidarcore.mapping.walls.parts import Part, find_parts
 from lidarcore.mapping.walls.pieces import collect_pieces
 from lidarcore.mapping.walls.settings import WallSettings
-from lidarcore.mapping.walls.sightings import Sightings
 from lidarcore.mapping.walls.spread import Spread, common_spread
 from lidarcore.mapping.walls.table import WallTable
 from lidarcore.scan import Scan
@@ -53,13 +53,13 @@ class Walls(WallTable):
     end_covariance  (W, 4, 4) of both ends, x and y; along the wall it means nothing where `ended` is false
     corners         where walls meet
     model           what the covariances come from, for what walls have in common
-    sightings       what of which segments each wall was seen by
+    observations    what of which segments each wall was seen by
     """
 
     end_covariance: Array
     corners: WallCorners
     model: WallModel = field(repr=False)
-    sightings: Sightings = field(repr=False)
+    observations: Observations = field(repr=False)
 
     def __repr__(self) -> str:
         return f"Walls({len(self)} walls, {self.length.sum():.1f} m, {len(self.corners)} corners)"
@@ -82,15 +82,15 @@ def find_walls(
     pieces = collect_pieces(scans, poses, extraction)
     parts = find_parts(pieces, group_pieces(pieces, settings), grid, settings)
     ends = [(find_end(pieces, part, 0), find_end(pieces, part, 1)) for part in parts]
-    meetings = find_meetings(parts, settings)
+    intersections = find_intersections(parts, settings)
     spread = spread if callable(spread) else common_spread(spread)
-    model = wall_model(pieces, parts, ends, meetings, spread, len(scans), extraction.noise.systematic)
+    model = wall_model(pieces, parts, ends, intersections, spread, len(scans), extraction.noise.systematic)
     xy = np.array([[part.fit.point(end.t) for end in pair] for part, pair in zip(parts, ends, strict=True)])
     xy = xy.reshape(-1, 2, 2)
-    xy[meetings.walls[:, 0], meetings.side] = meetings.xy
+    xy[intersections.walls[:, 0], intersections.side] = intersections.xy
     ended = np.array([[end.seen for end in pair] for pair in ends], bool).reshape(-1, 2)
     in_corner = np.zeros_like(ended)
-    in_corner[meetings.walls[:, 0], meetings.side] = True
+    in_corner[intersections.walls[:, 0], intersections.side] = True
     stamps = np.array([scan.stamp for scan in scans])
     seen = [np.unique(pieces.keyframe[part.members]) for part in parts]
     covariances = model.of_walls()
@@ -110,9 +110,9 @@ def find_walls(
         np.array([stamps[k].max() for k in seen]),
         np.array([len(k) for k in seen], np.int64),
         covariances[:, 2:, 2:],
-        _corners(parts, meetings, model),
+        _corners(parts, intersections, model),
         model,
-        Sightings.of(pieces, parts),
+        Observations.of(pieces, parts),
     )
 
 
@@ -130,12 +130,12 @@ def _lengths(ends: Array, covariance: Array) -> tuple[Array, Array]:
     return length, (J[:, None] @ covariance @ J[:, :, None])[:, 0, 0]
 
 
-def _corners(parts: list[Part], meetings: Meetings, model: WallModel) -> WallCorners:
+def _corners(parts: list[Part], intersections: Intersections, model: WallModel) -> WallCorners:
     """Every pair of walls once, however many of their ends meet there."""
-    pairs = np.sort(meetings.walls, axis=1)
+    pairs = np.sort(intersections.walls, axis=1)
     _, first = np.unique(pairs, axis=0, return_index=True)
     first = np.sort(first)
-    walls, xy = meetings.walls[first], meetings.xy[first]
+    walls, xy = intersections.walls[first], intersections.xy[first]
     if not len(walls):
         return WallCorners(xy, np.empty((0, 2, 2)), walls, csr_array((0, 4 * len(parts))))
     rows = [corner_rows(parts, int(i), int(j), at) for (i, j), at in zip(walls, xy, strict=True)]

@@ -16,7 +16,7 @@ FIRST = 5.0  # s until the first measurements: the motor comes up to speed befor
 
 
 @dataclass(frozen=True)
-class Wishes:
+class ScanOptions:
     """What the user asked for: baud rate, scan mode (None: what the sensor recommends), speed in rpm."""
 
     baud: int
@@ -27,26 +27,26 @@ class Wishes:
 class Session:
     """A sensor that measures. Raises DeviceError, of the type of what went wrong, and Cancelled."""
 
-    def __init__(self, path: str, wishes: Wishes, tap: Tap | None, cancelled: threading.Event) -> None:
-        self.port = Port(path, wishes.baud, tap, cancelled)
+    def __init__(self, path: str, options: ScanOptions, tap: Tap | None, cancelled: threading.Event) -> None:
+        self.port = Port(path, options.baud, tap, cancelled)
         try:
-            self._shake_hands(wishes)
+            self._shake_hands(options)
         except BaseException:
             self.close()
             raise
 
-    def _shake_hands(self, wishes: Wishes) -> None:
+    def _shake_hands(self, options: ScanOptions) -> None:
         self.info = handshake.identify(self.port)
         self.health = handshake.ensure_health(self.port)
         self.modes, typical = handshake.read_modes(self.port)
-        asked = handshake.choose_mode(self.modes, typical, wishes.mode)
+        asked = handshake.choose_mode(self.modes, typical, options.mode)
         answer, self._early = handshake.start(self.port, asked)
         # The sensor forgets a speed that was set before the scan began.
-        handshake.set_speed(self.port, wishes.rpm)
+        handshake.set_speed(self.port, options.rpm)
         self.mode = handshake.mode_sending(
             answer, asked, self.modes
         )  # what comes counts, not what was asked for
-        self.decoder = StreamDecoder(answer, self.mode.us_per_sample, wishes.baud)
+        self.decoder = StreamDecoder(answer, self.mode.us_per_sample, options.baud)
         self._packets = 0
         self._last = time.monotonic()
 

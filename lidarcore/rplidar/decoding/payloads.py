@@ -10,10 +10,10 @@ import numpy as np
 from lidarcore.rplidar.answers import Answer
 from lidarcore.scan import Ints
 
-Contents = tuple[Ints, Ints]
+Samples = tuple[Ints, Ints]
 """Distances (P, n) in 1/4 mm, 0: no return; lags in 1/65536 degree, (P, n) or one for all."""
 
-Decoder = Callable[[list[bytes], list[bytes | None]], Contents]
+Decoder = Callable[[list[bytes], list[bytes | None]], Samples]
 """From capsules, and for each the one that follows it, if that is known."""
 
 _HEADER = [("header", "V4")]  # sync and checksum, start angle
@@ -22,13 +22,13 @@ _EXPRESS = np.dtype([*_HEADER, ("cabins", [("pair", "<u2", 2), ("lags", "u1")], 
 _ULTRA = np.dtype([*_HEADER, ("cabins", "<u4", 32)])
 
 
-def _dense(capsules: list[bytes], following: list[bytes | None]) -> Contents:
+def _dense(capsules: list[bytes], following: list[bytes | None]) -> Samples:
     """40 distances in whole mm."""
     distances = np.frombuffer(b"".join(capsules), _DENSE)["distances"]
     return distances.astype(np.int64) << 2, np.zeros(1, np.int64)
 
 
-def _express(capsules: list[bytes], following: list[bytes | None]) -> Contents:
+def _express(capsules: list[bytes], following: list[bytes | None]) -> Samples:
     """16 cabins of two distances and lags; a lag (1/8 degree) has two bits beside its distance, four in a byte."""
     cabins = np.frombuffer(b"".join(capsules), _EXPRESS)["cabins"]
     pairs, halves = cabins["pair"].astype(np.int64), cabins["lags"].astype(np.int64)
@@ -36,7 +36,7 @@ def _express(capsules: list[bytes], following: list[bytes | None]) -> Contents:
     return (pairs & ~3).reshape(len(cabins), -1), (lags << 13).reshape(len(cabins), -1)
 
 
-def _ultra(capsules: list[bytes], following: list[bytes | None]) -> Contents:
+def _ultra(capsules: list[bytes], following: list[bytes | None]) -> Samples:
     """32 cabins of three distances: one as such, two as differences to it and to that of the next cabin."""
     words = np.frombuffer(b"".join(capsules), _ULTRA)["cabins"].astype(np.int64)
     after = [int.from_bytes(capsule[4:8], "little") if capsule else 0 for capsule in following]

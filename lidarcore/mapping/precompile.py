@@ -1,4 +1,4 @@
-"""Compiles the kernels of maps before anybody waits for them: python -m lidarcore.mapping.ahead, a minute, once."""
+"""Compiles the kernels of maps before anybody waits for them: `python -m lidarcore.mapping.precompile`, once."""
 
 import hashlib
 import os

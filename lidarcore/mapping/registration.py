@@ -1,4 +1,4 @@
-"""A scan is laid on a map of surface elements: point to line, robust, with the guess taking part [Censi, ICRA 2008]."""
+"""Registration of a scan on a map of surface elements: point to line, robust, with a prior [Censi, ICRA 2008]."""
 
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ _CAUCHY = 4.0  # squared standard deviations at which a distance counts half
 _DOUBT = 11.34  # chi-square of three degrees of freedom, 99 %: from here on the guess counts less
 
 
-class Laid(NamedTuple):
+class Registration(NamedTuple):
     """How a scan lies on a map.
 
     pose         (3,) T_map_scan
@@ -36,20 +36,24 @@ def information_of(covariance: Array) -> Array:
     return information
 
 
-def lay(map: Surfels, scan: Patches, start: Array, guess: Array, prior: Array, reach: float) -> Laid:
+def register(
+    map: Surfels, scan: Patches, start: Array, guess: Array, prior: Array, reach: float
+) -> Registration:
     """Gauss-Newton from a start (3,); the guess (3,) takes part with its information prior (3, 3).
 
     Where the match disagrees with the guess by more than chance allows (wheels that slip), the guess counts less;
     where the surfaces say nothing (along a corridor), it counts fully.
     """
     x, H = np.array(start), np.empty((3, 3))
-    inliers = _lay(map, scan, x, guess, prior, reach, H)
+    inliers = _register(map, scan, x, guess, prior, reach, H)
     x[2] = wrap(x[2])
-    return Laid(x, H, inliers)
+    return Registration(x, H, inliers)
 
 
 @kernel
-def _lay(map: Surfels, scan: Patches, x: Array, guess: Array, prior: Array, reach: float, H: Array) -> float:
+def _register(
+    map: Surfels, scan: Patches, x: Array, guess: Array, prior: Array, reach: float, H: Array
+) -> float:
     g, B, least, share = np.empty(3), np.empty((3, 3)), _LEAST * reach, 0.0
     for _ in range(_ROUNDS):
         share = linearised(map, scan, x, reach, H, B, g)

@@ -16,7 +16,7 @@ from lidarcore.mapping.walls.pieces import Pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sightings:
+class Observations:
     """N stretches of segments, each seen of one wall.
 
     wall     (N,) which; a segment may have been seen of several, one beside the other
@@ -32,12 +32,12 @@ class Sightings:
         return len(self.wall)
 
     @classmethod
-    def none(cls) -> "Sightings":
+    def none(cls) -> "Observations":
         """Of no wall."""
         return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2)))
 
     @classmethod
-    def of(cls, pieces: Pieces, parts: Sequence[Part]) -> "Sightings":
+    def of(cls, pieces: Pieces, parts: Sequence[Part]) -> "Observations":
         """Of walls by their place in the list: of each of its segments what lies between its ends."""
         found = [cls.none()]
         for i, part in enumerate(parts):
@@ -49,7 +49,7 @@ class Sightings:
         return cls.joined(found)
 
     @classmethod
-    def joined(cls, several: Sequence["Sightings"]) -> "Sightings":
+    def joined(cls, several: Sequence["Observations"]) -> "Observations":
         """All of them, one after the other."""
         return cls(
             np.concatenate([one.wall for one in several]),
@@ -57,13 +57,13 @@ class Sightings:
             np.concatenate([one.span for one in several]),
         )
 
-    def where(self, chosen: Mask) -> "Sightings":
+    def where(self, chosen: Mask) -> "Observations":
         """Those (N,) that are chosen."""
-        return Sightings(self.wall[chosen], self.segment[chosen], self.span[chosen])
+        return Observations(self.wall[chosen], self.segment[chosen], self.span[chosen])
 
-    def renamed(self, names: Ints) -> "Sightings":
+    def renamed(self, names: Ints) -> "Observations":
         """With names[i] for wall i."""
-        return Sightings(names[self.wall], self.segment, self.span)
+        return Observations(names[self.wall], self.segment, self.span)
 
     def lengths(self, walls: int) -> Array:
         """How much (W,) m of segments was seen of each of so many walls, each segment for itself."""
@@ -71,7 +71,7 @@ class Sightings:
         return total
 
 
-def common(before: Sightings, now: Sightings, shape: tuple[int, int]) -> csr_array:
+def common(before: Observations, now: Observations, shape: tuple[int, int]) -> csr_array:
     """How much (B, N) m of segments the walls of both have in common, each segment for itself."""
     order = np.argsort(now.segment, kind="stable")
     sought = now.segment[order]

@@ -8,7 +8,7 @@ import pytest
 CHECK = """
 import sys
 from itertools import islice
-from lidarcore.mapping import WholeScans, ahead
+from lidarcore.mapping import WholeScans, precompile
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
@@ -16,8 +16,8 @@ def compiled():
     kernels = [v for name, m in list(sys.modules.items()) if name.startswith("lidarcore.") for v in vars(m).values()]
     return {k.py_func.__qualname__: len(k.signatures) for k in kernels if hasattr(k, "py_func")}
 
-ahead.warm_up()
-assert not ahead.is_missing()
+precompile.warm_up()
+assert not precompile.is_missing()
 before = compiled()
 slam = WholeScans()
 for scan in islice(SimulatedRobot(SimulationSettings(world="two rooms", seed=2)), 300):

@@ -4,6 +4,7 @@ import logging
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
 
 logger = logging.getLogger(__name__)
 
@@ -27,10 +28,11 @@ class FailureLog:
             self._failing = False
 
 
-def join(thread: threading.Thread, within: float) -> bool:
-    """Wait at most so long (s) for a thread to end; whether it has, and a warning in the log if not."""
-    if thread.is_alive() and thread is not threading.current_thread():
-        thread.join(within)
-        if thread.is_alive():
-            logger.warning("the thread %r has not ended within %g s", thread.name, within)
+def join(thread: threading.Thread | BaseProcess, within: float) -> bool:
+    """Wait at most so long (s) for a thread or process to end; whether it has, and a warning in the log if not."""
+    if thread is threading.current_thread() or not thread.is_alive():
+        return not thread.is_alive()
+    thread.join(within)
+    if thread.is_alive():
+        logger.warning("%r has not ended within %g s", thread.name, within)
     return not thread.is_alive()

@@ -1,4 +1,4 @@
-"""Says when the noise that is seen contradicts the noise that is set."""
+"""Checks, from scan to scan, whether the noise that is seen contradicts the noise that is set."""
 
 from collections import deque
 
@@ -10,15 +10,15 @@ from lidarcore.evaluation.calibration.noise_check import contradiction, noise_ex
 SCANS = 20  # whose median speaks: one scan's estimate is off by a tenth or so
 
 
-class NoiseWatch:
-    """Told of the features of every scan; of another source, or with another noise, it begins anew."""
+class NoiseCheck:
+    """Told of the features of every scan; of another source, or with another noise, it starts again."""
 
     def __init__(self) -> None:
         self._of: tuple[int, SensorNoise] | None = None
         self._seen: deque[tuple[float, float]] = deque(maxlen=SCANS)
 
     def observe(self, found: Features, source: int) -> str | None:
-        """What there is to say after this scan; nothing before there have been SCANS."""
+        """The contradiction after this scan, in words; None if there is none, or before there have been SCANS."""
         noise = found.settings.noise
         if self._of != (source, noise):
             self._of = source, noise

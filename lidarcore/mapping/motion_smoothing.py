@@ -1,4 +1,4 @@
-"""How the sensor moved while it took each scan, as the scans around it tell once they are there.
+"""How the sensor moved while it took each scan, smoothed over the scans around it once they are there.
 
 When a scan comes, all that is known of its speed is the motion since the one before, which is a revolution old. A line
 through where the scans around it were taken says what the speed was in its middle.
@@ -22,19 +22,19 @@ _CUBIC = 0.3
 _ROUNDS = 3
 
 
-class Taken(NamedTuple):
-    """A scan as it was taken.
+class ScanMotion(NamedTuple):
+    """How a scan was deskewed and placed.
 
     half      s, mean time of its beams after its stamp; 0 if they were taken at once
     velocity  (3,) m/s, m/s, rad/s that was taken out of it
-    laid      (3,) variances with which it was laid
+    variances (3,) of the pose that it was placed at
     sweep     (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
     on        whether what it saw says where
     """
 
     half: float
     velocity: Array
-    laid: Array
+    variances: Array
     sweep: Array
     on: bool
 
@@ -44,14 +44,14 @@ def half_time(scan: Scan) -> float:
     return float(np.mean(scan.beam_times)) if scan.beam_times is not None and is_swept(scan) else 0.0
 
 
-def settled(stamps: Array, poses: Array, taken: list[Taken]) -> tuple[Array, list[Taken]]:
-    """Where scans were taken (T, 3), and they without the velocities that this shows; as they were where it does not.
+def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Array, list[ScanMotion]]:
+    """Poses (T, 3) of scans and their motions, with the velocities that the poses around show where they show any.
 
-    A scan that is without e too much of its velocity was laid e times the mean time of its beams behind: what poses
-    show, and where they are, depend on each other.
+    A scan from which e too much of its velocity was taken out was placed e times the mean time of its beams behind:
+    the velocities that poses show, and the poses, depend on each other.
     """
-    halves, on = np.array([one.half for one in taken]), np.array([one.on for one in taken])
-    removed = np.array([one.velocity for one in taken])
+    halves, on = np.array([one.half for one in motions]), np.array([one.on for one in motions])
+    removed = np.array([one.velocity for one in motions])
     at = np.arange(len(stamps))[:, None] + _AROUND
     there = np.clip(at, 0, len(stamps) - 1)
     t = stamps[there] - stamps[:, None]
@@ -66,11 +66,11 @@ def settled(stamps: Array, poses: Array, taken: list[Taken]) -> tuple[Array, lis
         v, spreads = _at_half(np.where(known[:, None], v, removed), stamps, middle, halves)
         v = np.where(known[:, None], v, removed)
         now = compose(poses, halves[:, None] * (removed - v))
-    noise = np.einsum("tk,tki->ti", slopes**2, np.array([one.laid for one in taken])[there])
+    noise = np.einsum("tk,tki->ti", slopes**2, np.array([one.variances for one in motions])[there])
     variances = spreads**2 + halves[:, None] ** 2 * noise
     after = [
         one._replace(velocity=v[k], sweep=np.diag(variances[k])) if known[k] else one
-        for k, one in enumerate(taken)
+        for k, one in enumerate(motions)
     ]
     return now, after
 

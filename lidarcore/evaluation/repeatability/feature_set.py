@@ -10,7 +10,7 @@ from lidarcore.geometry import act, left_of, unit_vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Look:
+class FeatureSet:
     """M walls and K corners, sensor frame.
 
     lines (M, 2) alpha rad, r m; ends (M, 2, 2) m; covariances (M, 2, 2) of the lines; corners (K, 2) m with
@@ -25,7 +25,7 @@ class Look:
     walls: Ints
 
     @classmethod
-    def of(cls, found: Features) -> "Look":
+    def of(cls, found: Features) -> "FeatureSet":
         """What was found, with the covariances that the settings asked for."""
         segments, lines, corners = found.segments, found.lines, found.corners
         return cls(
@@ -37,7 +37,7 @@ class Look:
             corners.segments,
         )
 
-    def with_systematic(self, sigma: float) -> "Look":
+    def with_systematic(self, sigma: float) -> "FeatureSet":
         """The same with a part that is the same in every scan from one place: of all walls, and so of the corners.
 
         The wall as a whole is off by sigma m, and its ends against each other by twice that.
@@ -45,7 +45,7 @@ class Look:
         if not sigma:
             return self
         added = sigma**2 * self._unit_systematic()
-        return Look(
+        return FeatureSet(
             self.lines,
             self.ends,
             self.covariances + added,

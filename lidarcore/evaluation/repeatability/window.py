@@ -13,7 +13,7 @@ from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.repeatability.scatter import (
     LEAST,
-    SIGHTING,
+    OBSERVATION,
     Observations,
     Scatter,
     one_sigma_areas,
@@ -25,13 +25,13 @@ from lidarcore.tracking import CornerRow
 
 
 class _Record(NamedTuple):
-    """One scan: table (K, M, SIGHTING), NaN where not found; areas (M, 2), medians over the features."""
+    """One scan: table (K, M, OBSERVATION), NaN where not found; areas (M, 2), medians over the features."""
 
     table: Array
     areas: Array
 
 
-class Sighted:
+class FeatureWindow:
     """Corners, or walls, in the last `window` scans, by several methods."""
 
     def __init__(self, window: int, methods: tuple[str, ...], noun: str) -> None:
@@ -50,7 +50,7 @@ class Sighted:
         self._firsts = Observations(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2)))
 
     def add(self, rows: Sequence[CornerRow | WallRow], table: Array) -> None:
-        """One more scan: its features, and what each method saw of them (K, M, SIGHTING), NaN where nothing."""
+        """One more scan: its features, and what each method saw of them (K, M, OBSERVATION), NaN where nothing."""
         k, first = np.arange(len(table)), np.isfinite(table[..., 0]).argmax(1)
         ids = np.array([row.id for row in rows], np.int64)
         new = Observations(ids, np.full(len(ids), self._added), table[k, first, :2])
@@ -59,9 +59,9 @@ class Sighted:
         self._records.append(_Record(table, _medians(one_sigma_areas(table))))
         self._added += 1
 
-    def sightings(self) -> Observations:
+    def observations(self) -> Observations:
         """All of the window, sorted by feature."""
-        nothing = np.empty((0, len(self.methods), SIGHTING))
+        nothing = np.empty((0, len(self.methods), OBSERVATION))
         return self._sorted(np.concatenate([nothing, *(record.table for record in self._records)]))
 
     def firsts(self) -> Observations:
@@ -75,7 +75,7 @@ class Sighted:
 
     def scatter(self) -> Scatter:
         """The figures of the window."""
-        return scatter(self.sightings(), len(self))
+        return scatter(self.observations(), len(self))
 
     def claims(
         self, found: Scatter
@@ -103,10 +103,10 @@ class Sighted:
 
         Raises EvaluationError for one that was not seen in the window.
         """
-        sightings = self.sightings()
-        seen = sightings.table[sightings.ids == number, :, :2]
+        observations = self.observations()
+        seen = observations.table[observations.ids == number, :, :2]
         if not len(seen):
-            known = np.unique(sightings.ids).tolist()
+            known = np.unique(observations.ids).tolist()
             raise EvaluationError(f"There is no {self.noun} {number} in the window; it has {known}.")
         return {name: _centred(seen[:, m]) for m, name in enumerate(self.methods)}
 

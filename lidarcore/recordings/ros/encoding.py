@@ -16,7 +16,7 @@ SENSOR_FRAME, ODOMETRY_FRAME = "laser", "odom"
 LIMITS = (0.05, 40.0)
 """m, range_min and range_max: those of an RPLIDAR S1. A scan that goes beyond widens its own."""
 
-Contents = dict[str, tuple[str, Any]]
+Messages = dict[str, tuple[str, Any]]
 """topic: type as package/Name, message"""
 
 _SEGMENTS, _CORNERS, _ELLIPSES = (
@@ -29,18 +29,18 @@ _ADD, _DELETE_ALL = 0, 3
 _FLAT = 1e-3  # m, thickness of what is drawn
 
 
-def contents(scan: Scan, features: Features | None, ellipse_scale: float) -> Contents:
+def encoded(scan: Scan, features: Features | None, ellipse_scale: float) -> Messages:
     """Messages of one scan, all with its stamp; what others refer to comes first.
 
     Raises RecordingError if the stamp is beyond what ROS 2 can express.
     """
     head = header(scan.stamp, SENSOR_FRAME)
-    laid = grid(scan)
-    made: Contents = {}
+    layout = grid(scan)
+    made: Messages = {}
     if scan.odometry is not None:
         made |= _odometry(scan.odometry, header(scan.stamp, ODOMETRY_FRAME))
-    made["/scan/beams"] = BEAMS, _beams(scan, laid, head)
-    made["/scan"] = LASER, _laser(scan, laid, head)
+    made["/scan/beams"] = BEAMS, _beams(scan, layout, head)
+    made["/scan"] = LASER, _laser(scan, layout, head)
     if features is not None:
         made["/features"] = MARKERS, _markers(features, head, ellipse_scale)
     return made
@@ -63,28 +63,28 @@ def _make(type_: str, *fields: Any) -> Any:
     return typestore("cdr").types[type_.replace("/", "/msg/")](*fields)
 
 
-def _beams(scan: Scan, laid: Grid, head: Any) -> Any:
-    times = np.empty(0) if scan.beam_times is None else laid.spread(scan.beam_times)
-    return _make(BEAMS, head, laid.spread(scan.bearings), times.astype(np.float32), scan.gaps.ravel())
+def _beams(scan: Scan, layout: Grid, head: Any) -> Any:
+    times = np.empty(0) if scan.beam_times is None else layout.spread(scan.beam_times)
+    return _make(BEAMS, head, layout.spread(scan.bearings), times.astype(np.float32), scan.gaps.ravel())
 
 
-def _laser(scan: Scan, laid: Grid, head: Any) -> Any:
+def _laser(scan: Scan, layout: Grid, head: Any) -> Any:
     """No return is inf (REP-117), data lost are NaN."""
     with np.errstate(over="ignore", invalid="ignore"):  # of numbers beyond 32 bits, which become inf
-        ranges = laid.spread(np.where(scan.valid, scan.ranges, np.inf)).astype(np.float32)
+        ranges = layout.spread(np.where(scan.valid, scan.ranges, np.inf)).astype(np.float32)
         span = 0.0 if scan.beam_times is None else np.ptp(scan.beam_times)
-        between = np.float32(span / max(laid.size - 1, 1))
-        period = between * np.float32(laid.size)
-        quality = np.empty(0) if scan.quality is None else laid.spread(scan.quality, 0)
+        between = np.float32(span / max(layout.size - 1, 1))
+        period = between * np.float32(layout.size)
+        quality = np.empty(0) if scan.quality is None else layout.spread(scan.quality, 0)
         quality = quality.astype(np.float32)
     seen = ranges[np.isfinite(ranges)]
     nearest, farthest = seen.min(initial=LIMITS[0]), seen.max(initial=0)
     return _make(
         LASER,
         head,
-        laid.angle_min,
-        laid.angle_min + laid.increment * (laid.size - 1),
-        laid.increment,
+        layout.angle_min,
+        layout.angle_min + layout.increment * (layout.size - 1),
+        layout.increment,
         float(between),
         float(period),
         float(nearest),
@@ -100,7 +100,7 @@ def _pose(x: float, y: float, heading: float, kind: str = "Point") -> tuple[Any,
     return _make(f"geometry_msgs/{kind}", x, y, 0.0), turn
 
 
-def _odometry(T_odom_sensor: Array, head: Any) -> Contents:
+def _odometry(T_odom_sensor: Array, head: Any) -> Messages:
     x, y, heading = T_odom_sensor.tolist()
     transform = _make("geometry_msgs/Transform", *_pose(x, y, heading, "Vector3"))
     unknown = np.zeros(36)

@@ -1,4 +1,4 @@
-"""Patches, surfels and how a scan is laid on them, against known motion, brute force and finite differences."""
+"""Patches, surfels and how a scan is registered on them, against known motion, brute force and finite differences."""
 
 import numpy as np
 import pytest
@@ -9,8 +9,8 @@ from lidarcore import Scan
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.correlative import search
-from lidarcore.mapping.laying import lay, linearised
 from lidarcore.mapping.patches import patches
+from lidarcore.mapping.registration import linearised, register
 from lidarcore.mapping.surfels import nearest, surfels
 from lidarcore.simulation import furnished_room, random_pose
 from lidarcore.simulation.rooms import rectangular_room
@@ -58,9 +58,9 @@ def test_a_scan_is_laid_where_it_was_taken():
         step = rng.normal(0, [0.1, 0.1, 0.05])
         map = map_of([full_scan(ROOM, pose, NOISE, rng)])
         scan = patches(full_scan(ROOM, compose(pose, step), NOISE, rng), MATCH)
-        laid = lay(map, scan, np.zeros(3), np.zeros(3), np.diag([10.0, 10, 10]), MATCH.reach)
-        assert laid.inliers > 0.7
-        errors.append(pose_difference(laid.pose, step))
+        registered = register(map, scan, np.zeros(3), np.zeros(3), np.diag([10.0, 10, 10]), MATCH.reach)
+        assert registered.inliers > 0.7
+        errors.append(pose_difference(registered.pose, step))
     assert np.sqrt(np.mean(np.square(errors)[:, :2].sum(1))) < 0.006
 
 
@@ -73,10 +73,10 @@ def test_along_a_corridor_the_guess_decides():
         map = map_of([sick_scan(corridor, pose, NOISE, rng)])
         guess = rng.normal(0, [0.1, 0.1, 0.05])
         scan = patches(sick_scan(corridor, pose, NOISE, rng), MATCH)
-        laid = lay(map, scan, guess, guess, np.linalg.inv(prior), MATCH.reach)
-        claims.append(np.sqrt(np.linalg.inv(laid.information)[0, 0]))
-        assert abs(laid.pose[0] - guess[0]) < 4 * claims[-1]
-        assert abs(laid.pose[1]) < 0.03
+        registered = register(map, scan, guess, guess, np.linalg.inv(prior), MATCH.reach)
+        claims.append(np.sqrt(np.linalg.inv(registered.information)[0, 0]))
+        assert abs(registered.pose[0] - guess[0]) < 4 * claims[-1]
+        assert abs(registered.pose[1]) < 0.03
     assert np.median(claims) > 0.06
 
 
@@ -141,8 +141,8 @@ def test_a_scan_without_surfaces_has_no_patches_and_stays_at_the_guess(ranges):
     map = map_of([sick_scan(ROOM, random_pose(ROOM, rng), NOISE, rng)])
     seen = patches(Scan(ranges, np.deg2rad(np.arange(-90.0, 90))), MATCH)
     guess = np.array([0.1, 0.2, 0.3])
-    laid = lay(map, seen, guess, guess, np.eye(3), MATCH.reach)
+    registered = register(map, seen, guess, guess, np.eye(3), MATCH.reach)
     assert len(seen.means) == 0
-    assert laid.inliers == 0
-    np.testing.assert_allclose(laid.pose, guess, atol=1e-9)
-    np.testing.assert_allclose(laid.information, np.eye(3), atol=1e-9)
+    assert registered.inliers == 0
+    np.testing.assert_allclose(registered.pose, guess, atol=1e-9)
+    np.testing.assert_allclose(registered.information, np.eye(3), atol=1e-9)

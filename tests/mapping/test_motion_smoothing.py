@@ -9,7 +9,7 @@ from lidarcore import SensorNoise
 from lidarcore.evaluation.maps.honesty import drive
 from lidarcore.geometry import compose, pose_difference, relative
 from lidarcore.mapping import Mapper, MapperSettings
-from lidarcore.mapping.settling import Taken, settled
+from lidarcore.mapping.motion_smoothing import ScanMotion, smoothed
 
 HALF = 0.05  # s
 T = np.arange(40) / 10
@@ -29,15 +29,15 @@ def velocities(t):
     return relative(way(t + HALF - 1e-3), way(t + HALF + 1e-3)) / 2e-3
 
 
-def taken(removed):
-    return [Taken(HALF, v, np.full(3, 1e-8), np.eye(3), True) for v in removed]
+def motions(removed):
+    return [ScanMotion(HALF, v, np.full(3, 1e-8), np.eye(3), True) for v in removed]
 
 
 def test_speeds_and_places_are_found_though_each_scan_was_laid_with_the_speed_before_it():
     removed = np.concatenate([np.zeros((1, 3)), velocities(T)[:-1]])
     laid = compose(way(T), HALF * (velocities(T) - removed))
     assert np.abs(pose_difference(laid, way(T))).max() > 0.005
-    at, after = settled(T, laid, taken(removed))
+    at, after = smoothed(T, laid, motions(removed))
     found = np.array([one.velocity for one in after])
     assert np.abs(found - velocities(T))[2:-2].max() < 0.02
     assert np.abs(pose_difference(at, way(T)))[2:-2].max() < 1e-3
@@ -47,17 +47,17 @@ def test_speeds_and_places_are_found_though_each_scan_was_laid_with_the_speed_be
 
 
 def test_scans_that_lie_on_nothing_and_those_taken_at_once_stay_as_they_were():
-    given = taken(velocities(T))
+    given = motions(velocities(T))
     given[7] = given[7]._replace(on=False)
     given[20] = given[20]._replace(half=0.0)
     laid = way(T)
     laid[7] += [0.3, 0, 0]
-    at, after = settled(T, laid, given)
+    at, after = smoothed(T, laid, given)
     for k in (7, 20):
         assert after[k] is given[k]
         np.testing.assert_allclose(at[k], laid[k], atol=1e-12)
     assert np.abs(pose_difference(at, way(T)))[[5, 6, 8, 9]].max() < 3e-3
-    alone, kept = settled(T[:1], laid[:1], given[:1])
+    alone, kept = smoothed(T[:1], laid[:1], given[:1])
     assert kept[0] is given[0]
     np.testing.assert_array_equal(alone, laid[:1])
 
@@ -80,6 +80,6 @@ def test_a_robot_that_swings_into_a_turn_is_where_the_finished_map_says(odometry
     assert len(off) > 8
     print(np.sqrt(np.mean(off**2, axis=0)))
     assert np.sqrt(np.mean(off[:, 2] ** 2)) < 0.0025
-    settled_once = mapper.trajectory()[1]
+    smoothed_once = mapper.trajectory()[1]
     mapper.finish()
-    np.testing.assert_allclose(mapper.trajectory()[1], settled_once, atol=2e-3)
+    np.testing.assert_allclose(mapper.trajectory()[1], smoothed_once, atol=2e-3)

@@ -12,8 +12,8 @@ _SHARE = 0.4  # of a wall's length that a corner may move its end by
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Meetings:
-    """C corners of walls.
+class Intersections:
+    """C corners of walls: intersections of their lines.
 
     walls  (C, 2) which; the first one ends there
     side   (C,) 0 or 1: which end of the first one
@@ -25,10 +25,10 @@ class Meetings:
     xy: Array
 
 
-def find_meetings(parts: list[Part], settings: WallSettings) -> Meetings:
+def find_intersections(parts: list[Part], settings: WallSettings) -> Intersections:
     """For every end of every wall the nearest corner, if there is one within the gap that settings allow."""
     if not parts:
-        return Meetings(np.empty((0, 2), np.int64), np.empty(0, np.int64), np.empty((0, 2)))
+        return Intersections(np.empty((0, 2), np.int64), np.empty(0, np.int64), np.empty((0, 2)))
     centre = np.stack([part.fit.centre for part in parts])
     normal, along = (
         np.stack([part.fit.normal for part in parts]),
@@ -50,4 +50,4 @@ def find_meetings(parts: list[Part], settings: WallSettings) -> Meetings:
             if gap[j] <= min(settings.corner_gap, _SHARE * part.length):
                 found.append((i, j, side, *xy[j]))
     table = np.array(found, np.float64).reshape(-1, 5)
-    return Meetings(table[:, :2].astype(np.int64), table[:, 2].astype(np.int64), table[:, 3:])
+    return Intersections(table[:, :2].astype(np.int64), table[:, 2].astype(np.int64), table[:, 3:])

@@ -1,4 +1,4 @@
-"""What is kept of a piece, so that two can be joined and judged without looking at their points again."""
+"""Moments of the points of a piece, so that two can be joined and judged without looking at their points again."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ from lidarcore.scan import Array, Ints
 # Columns: number of points, means of x and y, centred second moments per point, means of c² and c s, and what the
 # best line leaves: the sum of squared distances, and the same in variances.
 COUNT, X, Y, XX, XY, YY, CC, CS, SQUARES, CHI2 = range(10)
-SUMS = 10
+MOMENTS = 10
 _TRIM_FROM = 4  # intervals between points: three are left
 
 
 @inlined
-def sums(rho: Array, c: Array, s: Array, out: Array) -> None:
-    """Sums of a piece, all but what its line leaves, into out."""
+def moments(rho: Array, c: Array, s: Array, out: Array) -> None:
+    """Moments of a piece, all but what its line leaves, into out."""
     middle = len(rho) // 2
     x0, y0 = rho[middle] * c[middle], rho[middle] * s[middle]
     x_sum = y_sum = xx = xy = yy = cc = cs = 0.0
@@ -36,25 +36,28 @@ def sums(rho: Array, c: Array, s: Array, out: Array) -> None:
 
 
 @inlined
-def sums_of(points: Array, first: Ints, last: Ints, m: Array, count: int, trimmed: bool) -> None:
-    """Sums of each of `count` pieces, all but what its line leaves, into m; trimmed, without the end points of all but
-    the shortest: where a piece was split they are extremes, and often of two walls."""
+def moments_of(points: Array, first: Ints, last: Ints, m: Array, count: int, trimmed: bool) -> None:
+    """Moments of each of `count` pieces, all but what its line leaves, into m.
+
+    trimmed  without the end points of all but the shortest: where a piece was split they are extremes, and often of
+             two walls
+    """
     for p in range(count):
         trim = 1 if trimmed and last[p] - first[p] >= _TRIM_FROM else 0
         inside = slice(first[p] + trim, last[p] + 1 - trim)
-        sums(points[0, inside], points[1, inside], points[2, inside], m[p])
+        moments(points[0, inside], points[1, inside], points[2, inside], m[p])
 
 
 @inlined
 def copy(row: Array, out: Array) -> None:
     """Entry by entry: an assignment of whole rows compiles a check of their shapes, which takes seconds."""
-    for i in range(SUMS):
+    for i in range(MOMENTS):
         out[i] = row[i]
 
 
 @inlined
 def join(a: Array, b: Array, out: Array) -> None:
-    """Sums of two pieces together, all but what their line leaves."""
+    """Moments of two pieces together, all but what their line leaves."""
     n = a[COUNT] + b[COUNT]
     p, q = a[COUNT] / n, b[COUNT] / n
     dx, dy = b[X] - a[X], b[Y] - a[Y]
@@ -68,7 +71,7 @@ def join(a: Array, b: Array, out: Array) -> None:
 
 @inlined
 def line_of(m: Array) -> tuple[float, float, float, float]:
-    """Unit normal, signed distance and mean squared residual of the best line through a piece with sums m."""
+    """Unit normal, signed distance and mean squared residual of the best line through a piece with moments m."""
     half, dev = (m[XX] + m[YY]) / 2, (m[XX] - m[YY]) / 2
     root = np.sqrt(dev * dev + m[XY] * m[XY])
     # Eigenvector of the smaller eigenvalue half - root, from the row that does not cancel.
