@@ -11,11 +11,11 @@ class NotFoundError(LidarError):
 
 
 class ConflictError(LidarError):
-    """It cannot be done now: a name is taken, or something else is under way."""
+    """Something cannot be done now: a name is taken, or something else is under way."""
 
 
 class InvalidNameError(LidarError):
-    """This is no plain file name."""
+    """A name is no plain file name."""
 
 
 class TooLargeError(LidarError):
@@ -45,5 +45,5 @@ def invalid_values(error: InvalidValues) -> list[tuple[list[str], str]]:
 
 
 def explained(error: InvalidValues) -> str:
-    """All of them in a line, each after its dotted name."""
+    """Every value that is not valid in a line: its dotted name and what is wrong with it."""
     return "; ".join(": ".join(filter(None, (".".join(path), what))) for path, what in invalid_values(error))

@@ -76,7 +76,7 @@ def find_corners(
 
 @inlined
 def _distance(corner: Array, segment: Array, end: int) -> float:
-    """From a corner to one end of a segment."""
+    """Distance (m) of a corner from one end of a segment."""
     return np.sqrt((corner[0] - segment[end]) ** 2 + (corner[1] - segment[end + 1]) ** 2)
 
 

@@ -143,7 +143,7 @@ class SensorNoise:
 
 @lru_cache
 def _widened(tails: float) -> float:
-    """By how much the variance of a Gaussian's location grows, relatively, where errors are weighted as Student's.
+    """Relative growth of the variance of a Gaussian's location where errors are weighted as Student's.
 
     E[psi²] / E[psi']² - 1 with psi = z (1 + tails) / (1 + tails z²), by Gauss-Hermite quadrature.
     """

@@ -51,4 +51,4 @@ SENSORS: dict[str, SensorKind] = {
         "1.5 m and 4 mm at 3.7 m. What repeats from scan to scan is not known; the noise of bearings is assumed.",
     ),
 }
-"""By the names that `--settings` takes."""
+"""Kinds of sensors, by the names that `--settings` takes."""

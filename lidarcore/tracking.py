@@ -73,7 +73,7 @@ class Tracker:
     _next_id: int = 1
 
     def forget(self) -> None:
-        """Another scene: no corner of it is one seen before. Ids are never used again."""
+        """Forget all corners: those of another scene are new. Ids are never used again."""
         self._known.clear()
 
     def rows(self, features: Mapping[str, Features]) -> tuple[CornerRow, ...]:

@@ -172,7 +172,7 @@ def _queries() -> Table:
 
 
 def _age(load: Load, percentile: float, most: float) -> str:
-    """From the revolution's last byte to its frame on the way to a browser, ms; judged where there is one browser."""
+    """ms from a revolution's last byte to its frame on the way to a browser; judged where there is one browser."""
     age = float(np.percentile(load.age_ms, percentile))
     return _judged(f"{age:.1f}", age <= most) if load.clients == 1 else f"{age:.1f}"
 

@@ -15,7 +15,7 @@ COLOURS = {"true": "green", "open": "yellow", "too small": "red", "too large": "
 
 
 def tables(study: Consistency, by_room: bool) -> Iterator[Table]:
-    """One for each segmentation, room (or all together) and noise."""
+    """A table for each segmentation, room (or all together) and noise."""
     key = attrgetter("segments", "room", "noise.sigma_range", "noise.sigma_bearing")
     rows = sorted(study.rows() if by_room else study.pooled(), key=key)
     for (segments, room, sigma_range, sigma_bearing), group in groupby(rows, key):

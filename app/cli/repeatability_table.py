@@ -13,7 +13,7 @@ MICRO = 1e6  # mm² in a m², mrad mm in a rad m
 
 
 def tables(summary: Summary) -> Iterator[Table]:
-    """One of corners, areas in mm², and one of walls, areas of (alpha, r) in mrad mm."""
+    """A table of corners, areas in mm², and one of walls, areas of (alpha, r) in mrad mm."""
     corners = [(method, method.corners) for method in summary.methods]
     walls = [(method, method.walls) for method in summary.walls.methods]
     yield _table(f"Corners in the last {summary.scans} scans", "corners", "mm²", corners)

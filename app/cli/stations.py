@@ -76,7 +76,7 @@ def stations(
 def named_stations(
     recordings: list[Path], topic: str | None, mask: "Sequence[Sector] | None"
 ) -> "Iterator[tuple[str, list[Scan]]]":
-    """Each that is long enough, with a name: that of its file, and a number if there are several."""
+    """Each station that is long enough, with a name: that of its file, and a number if there are several."""
     from lidarcore import open_recording
     from lidarcore.evaluation.stations.recording import stations as split
     from lidarcore.evaluation.stations.study import SHORTEST

@@ -61,7 +61,7 @@ class CalibrationReport:
 
 
 def report(found: Calibration) -> CalibrationReport:
-    """All of it."""
+    """A calibration as its report: intervals, bands and remarks."""
     bias = found.range_bias
     if bias is not None and bias.half_width > TELLING:
         bias = None
@@ -118,7 +118,7 @@ def _differs(bands: Bands) -> bool:
 
 
 def _on_sigma(name: str, sigma: Interval, *units: tuple[float, int, str]) -> list[str]:
-    """Each of the units with its factor and its digits."""
+    """A remark if sigma cannot be determined; each of the units with its factor and its digits."""
     if sigma.low > 0:
         return []
     most = " or ".join(f"{_number(sigma.high, factor, digits)}{unit}" for factor, digits, unit in units)

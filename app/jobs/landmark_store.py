@@ -169,7 +169,7 @@ class LandmarkStore:
         return run
 
     def begin_walls(self, source: str, replay: Hashable = None) -> WallRun:
-        """Likewise a run whose map is one of walls."""
+        """A run begins with an empty map of walls of its own, and the one before ends; `replay` is as in `begin`."""
         self.use(None)
         self._run = run = WallRun(WallWriter(self.atlas, source, "slam"), self._schedule, replay)
         return run
@@ -286,7 +286,7 @@ class LandmarkStore:
             listener(change)
 
     def _put_back(self, run: _StoredRun, waiting: _Waiting, error: LidarError) -> float:
-        """It waits on if nothing newer does; but a map that was deleted does not come back when its run has ended."""
+        """A run waits on if nothing newer does; but a deleted map does not come back when its run has ended."""
         is_deleted = isinstance(error, UnknownLandmarkError | UnknownSessionError)
         if not (is_deleted and waiting.ended):
             with self._news:

@@ -100,13 +100,13 @@ class MapWriter:
         )
 
     def _keep(self, left: Container[int | None]) -> None:
-        """Others took out all but these ids: the rest is to be written anew."""
+        """Forget which landmarks are in the file but these ids: someone deleted the others, which are written again."""
         self.ids = {id: known for id, known in self.ids.items() if known in left}
         self._written = self._written[np.isin(self._written["id"], list(self.ids))]
 
 
 def as_table(landmarks: Landmarks, method: str) -> Table:
-    """The confirmed ones as columns."""
+    """The confirmed landmarks as a table, a column for each field."""
     which, points = landmarks.confirmed, landmarks.points
     xy, C = points.xy[which], points.covariance[which]
     columns: dict[str, Any] = {

@@ -66,13 +66,13 @@ class ProfileEntry:
 
 @dataclass(frozen=True)
 class Profiles:
-    """Those in one folder, which is made when the first is written. Nothing is written outside."""
+    """Profiles in one folder, which is made when the first is written. Nothing is written outside."""
 
     folder: Path
     _writing: threading.Lock = field(default_factory=threading.Lock, init=False, repr=False, compare=False)
 
     def list(self) -> list[ProfileEntry]:
-        """All that are there, by name; what cannot be read is listed with its problem."""
+        """All profiles, by name; what cannot be read is listed with its problem."""
         paths = self.folder.glob(f"*{SUFFIX}") if self.folder.is_dir() else ()
         names = (path.stem for path in paths if PLAIN_NAME.fullmatch(path.name))
         return [self._entry(name) for name in sorted(names, key=str.lower)]

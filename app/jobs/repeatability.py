@@ -110,7 +110,7 @@ class LiveRepeatability:
 
 
 def _kind(frame: Frame) -> _Kind:
-    """All methods and both covariances are told of, whichever are chosen."""
+    """What the window depends on: not on the chosen method and covariance, since all of them are told of."""
     chosen, default = frame.settings.extraction, ExtractionSettings()
     neutral = replace(chosen, fitter=default.fitter, covariance=default.covariance)
     return _Kind(

@@ -10,14 +10,14 @@ from lidarcore.mapping.grid import OccupancyGrid
 
 
 def grid_to_stored(grid: OccupancyGrid) -> StoredGrid:
-    """As the file keeps it."""
+    """A grid as the file of maps keeps it."""
     (x, y, heading), (rows, columns) = grid.origin.tolist(), grid.cells.shape
     cells = zlib.compress(grid.cells.tobytes())
     return StoredGrid(grid.resolution, x, y, heading, rows, columns, cells)
 
 
 def grid_from_stored(stored: StoredGrid) -> OccupancyGrid:
-    """As it was. Raises MapFileError if it is damaged."""
+    """A grid that the file of maps keeps. Raises MapFileError if it is damaged."""
     count = stored.rows * stored.columns
     try:
         cells = zlib.decompressobj().decompress(stored.cells, count + 1)

@@ -79,7 +79,7 @@ class _Study:
 
 
 class Studies:
-    """Every method may be called from any thread."""
+    """Studies, one at a time, and their reports. Every method may be called from any thread."""
 
     def __init__(self, folder: Path) -> None:
         self.reports = Reports(folder.absolute())
@@ -165,5 +165,5 @@ def _usual(report: ReportEntry) -> bool:
 
 
 def _workers() -> int:
-    """One core is left to live view."""
+    """Number of processes for a study: one core is left to the live view."""
     return max(1, (os.cpu_count() or 1) - 1)

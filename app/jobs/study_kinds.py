@@ -27,11 +27,11 @@ class Options(BaseModel, ABC):
 
     @abstractmethod
     def arguments(self, noise: SensorNoise, path: Callable[[str], Path]) -> list[str]:
-        """Of the command; with the noise set now, and where a recording is."""
+        """Arguments of the command, with the noise set now, and where a recording is."""
 
 
 class CornerOptions(Options):
-    """Of the papers on corners."""
+    """Options of the papers on corners."""
 
     scans: int | None = Field(
         None,
@@ -63,7 +63,7 @@ class CornerOptions(Options):
 
 
 class DriveOptions(Options):
-    """Of the paper on clusters and the Kalman filter."""
+    """Options of the paper on clusters and the Kalman filter."""
 
     runs: int | None = Field(
         None, ge=1, le=200, description="drives along each trajectory; as many as `quick` says if none"
@@ -75,7 +75,7 @@ class DriveOptions(Options):
 
 
 class ConsistencyOptions(Options):
-    """Of the study of consistency."""
+    """Options of the study of consistency."""
 
     trials: int | None = Field(
         None,

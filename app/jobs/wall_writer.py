@@ -52,7 +52,7 @@ class WallWriter:
 
 
 def to_stored(walls: WallTable) -> list[StoredWall]:
-    """The confirmed ones."""
+    """The confirmed walls as the file of maps keeps them."""
     C = walls.line_covariance
     columns = [
         walls.ids, walls.alpha, walls.r, C[:, 0, 0], C[:, 0, 1], C[:, 1, 1], *walls.ends.reshape(-1, 4).T,
@@ -64,7 +64,7 @@ def to_stored(walls: WallTable) -> list[StoredWall]:
 
 
 def from_stored(walls: Sequence[StoredWall]) -> WallTable:
-    """As they were."""
+    """Walls that the file of maps keeps, as a table."""
 
     def column(*names: str) -> np.ndarray:
         return np.array([[getattr(wall, name) for name in names] for wall in walls]).reshape(-1, len(names))

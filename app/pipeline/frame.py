@@ -65,7 +65,7 @@ class Frame:
         return AT_ORIGIN if self.localization is None else self.localization.tracking.estimate.pose
 
     def extent(self) -> Array:
-        """From and to along x and y of the world, m, of what is seen and the sensor, without stray points: (2, 2)."""
+        """Extent (2, 2) m of what is seen and the sensor, without stray points: ends along x and y of the world."""
         pose = self.pose
         ends: Array = pose[:2, None] + np.array([-AROUND, AROUND])
         seen = np.ascontiguousarray(act(pose, self.scan.xy[self.scan.valid]).T)

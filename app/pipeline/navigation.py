@@ -47,7 +47,7 @@ class MapStore(Protocol):
         """An empty map, to be built; in place of the last one with that `replay`, unless it is None."""
 
     def begin_walls(self, source: str, *, replay: Hashable) -> WallRun:
-        """Likewise a map of walls."""
+        """An empty map of walls, to be built; in place of the last one with that `replay`, unless it is None."""
 
     def use(self, session: int | None) -> None:
         """No map is built any more; that of a session is used, if one is given."""
@@ -108,7 +108,7 @@ class Navigation:
 
     @property
     def trajectory(self) -> list[TrackedPose]:
-        """All poses of this run that are kept. As with the others below, who asks does not wait for a scan."""
+        """All poses of this run that are kept. Who asks does not wait for a scan."""
         run = self._run
         return list(run.trails.trajectory.copy()) if run else []  # one step, whoever appends meanwhile
 
@@ -180,7 +180,7 @@ class Navigation:
             return run.step(timed.position.index, scan, features, clusters, method) if run else None
 
     def _with_odometry(self, scan: Scan) -> Scan:
-        """With what another program says of the moment, unless the source has odometry itself."""
+        """A scan with the odometry that another program sent for its moment, unless the source has odometry itself."""
         if scan.odometry is not None or (pose := self.odometry.at(scan.stamp)) is None:
             return scan
         return replace(scan, odometry=pose)

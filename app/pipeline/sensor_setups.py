@@ -38,7 +38,7 @@ class SensorSetups:
         self._told: dict[str, SensorSetup] = {}
 
     def tell(self, source: Source, setup: SensorSetup) -> None:
-        """This is how the sensor of that source is, as someone has set it."""
+        """Note the setup that someone has chosen for the sensor of that source."""
         self._told[source.sensor] = setup
         if source.kind == "device":
             self._memory.remember(source.sensor, setup)

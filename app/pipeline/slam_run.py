@@ -105,7 +105,7 @@ class Run:
         )
 
     def deskewed(self, index: int, scan: Scan) -> Scan:
-        """As the navigator would have it, or had it."""
+        """A scan deskewed as the navigator would do it now, or did it when the scan was new."""
         seen = self.recall(index)
         if seen is None:
             return self.navigator.deskewed(scan)

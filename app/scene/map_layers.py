@@ -62,7 +62,7 @@ class MapLayers:
         self._canvas.picture("occupancy", pixels, (float(size[0]), float(size[1])), middle)
 
     def _draw_associations(self, localization: Localization | None, layers: Layers) -> None:
-        """From where something is seen to the landmark it is taken for; the ambiguous ones in another colour."""
+        """Lines from where something is seen to the landmark it is taken for; ambiguous ones in another colour."""
         strokes, colours = [NOTHING], [np.empty((0, 3), np.uint8)]
         if localization is not None:
             found = localization.tracking

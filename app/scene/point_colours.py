@@ -14,7 +14,7 @@ FAR = 98  # percent of the ranges that a scale covers
 
 @dataclass(frozen=True, slots=True)
 class ColourScale:
-    """From zero to `high` the colours `stops` (#rrggbb) at equal distances; what is above looks like `high`."""
+    """Colours from zero to `high`: `stops` (#rrggbb) at equal distances; what is above looks like `high`."""
 
     high: float
     unit: str

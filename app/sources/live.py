@@ -145,7 +145,7 @@ class LiveSource(HistorySource):
             self._taps.bytes(direction, time, data)
 
     def _emulator_ended(self) -> None:
-        """By itself; it does not come back, so there is nothing to reconnect to."""
+        """The emulator ended by itself; it does not come back, so there is nothing to reconnect to."""
         self.error = "The emulator has ended: choose it again to start a new one."
         self._let_go()
         self._changed()

@@ -29,6 +29,6 @@ class MapChanges:
         self._landmarks.update((landmark.id, landmark) for landmark in change.landmarks)
 
     def text(self) -> str:
-        """As JSON."""
+        """The changes as JSON."""
         rows = list(self._landmarks.values())
         return to_json({"session": self._session, "changed": rows, "removed": sorted(self._removed)}).decode()

@@ -51,11 +51,11 @@ class Metrics(Collector):
         self._latency.observe(frame.age())
 
     def text(self) -> bytes:
-        """All of it, in Prometheus' text format."""
+        """All metrics, in Prometheus' text format."""
         return generate_latest(self.registry)
 
     def collect(self) -> Iterator[Metric]:
-        """What is known elsewhere; called by the registry."""
+        """Metrics whose values are known elsewhere; called by the registry."""
         frame, status = self._runtime.frame, self._recorder.status
         yield _counter("frames", "scans processed", frame.sequence if frame else 0)
         yield _counter("frames_dropped", "scans overtaken by a newer one", frame.dropped if frame else 0)

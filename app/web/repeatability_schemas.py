@@ -73,7 +73,7 @@ class WallMethodJson(TypedDict):
 
 
 class WallRepeatabilityJson(TypedDict):
-    """Of walls, what is told of corners: areas in rad m."""
+    """Repeatability of walls, told like that of corners: areas in rad m."""
 
     window: int
     scans: int

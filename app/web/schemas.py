@@ -34,7 +34,7 @@ class Body(BaseModel):
 
 
 class StrictBody(Body):
-    """The same, and no value is converted to the type asked for."""
+    """What a client sends, with no name that is not known, and no value converted to the type asked for."""
 
     model_config = ConfigDict(strict=True)
 

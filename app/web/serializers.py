@@ -122,7 +122,7 @@ def measured_corners_json(features: Features) -> list[MeasuredCornerJson]:
 
 
 def _columns(schema: type, columns: Columns, features: Features) -> dict[str, list[float]]:
-    """Those of the columns that the schema asks for."""
+    """The columns that the schema asks for."""
     wanted = schema.__annotations__
     return {name: column(features).tolist() for name, column in columns.items() if name in wanted}
 
@@ -174,7 +174,7 @@ def pose_json(pose: Array) -> PoseJson:
 
 
 def localization_json(localization: Localization) -> LocalizationJson:
-    """All there is to say of one scan."""
+    """The localization of one scan as JSON."""
     found = localization.tracking
     estimate, confirmed = found.estimate, found.landmarks.confirmed
     return {

@@ -10,7 +10,7 @@ from lidarcore.errors import ClientError, ServerUnreachableError
 
 
 class Connection:
-    """To one server, kept open between requests. Raises ServerUnreachableError and ClientError."""
+    """A connection to one server, kept open between requests. Raises ServerUnreachableError and ClientError."""
 
     def __init__(self, url: str, token: str | None, timeout: float) -> None:
         self._url = url.rstrip("/")
@@ -72,7 +72,7 @@ class Connection:
 
 
 def given(**values: Any) -> dict[str, Any]:
-    """Those that are not None."""
+    """The arguments that are not None, as parameters of a request."""
     return {name: value for name, value in values.items() if value is not None}
 
 

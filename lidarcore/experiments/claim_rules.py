@@ -72,7 +72,7 @@ def _distances(figure: Interval, target: float) -> tuple[float, float]:
 
 
 def every(verdicts: Sequence[bool | None]) -> bool | None:
-    """Of a claim of several figures: one that differs is enough to differ."""
+    """Verdict on a claim of several figures: it differs if one of them does."""
     return False if False in verdicts else None if None in verdicts else True
 
 

@@ -174,14 +174,14 @@ def _drive_map(design: Design, drive: Drive, track: Track, mode: str) -> Map:
 
 
 def _ellipses(track: Track, scans: int) -> list[tuple[str, Array, Array]]:
-    """Of the clusters of so many scans, spread over the drive; a map at the end belongs to the last one."""
+    """Ellipses of the clusters of so many scans, spread over the drive; a map at the end belongs to the last one."""
     shown = np.unique(np.linspace(0, len(track.stamps) - 1, scans).astype(int))
     chosen = np.isin(track.of_scan, shown)
     return [("", track.landmarks[chosen], track.landmark_covariances[chosen])]
 
 
 def _track(result: ClusteringStudy, trajectory: str, method: str, mode: str) -> Track:
-    """Of the first run."""
+    """The track of the first run."""
     outcome = next(o for o in result.outcomes if (o.run, o.trajectory, o.method) == (0, trajectory, method))
     return outcome.tracks[mode]
 

@@ -73,7 +73,7 @@ class CornerStudy:
         return sigmas
 
     def below_bound(self, fitter: str) -> int:
-        """Of how many corners the published ellipse is smaller than any honest one can be, by its area."""
+        """Number of corners whose published ellipse has a smaller area than any honest one can have."""
         assert self.bounds is not None
         areas = np.nanmedian(_areas(self.trials[fitter, "published"].covariances), axis=1)
         return int((areas < _areas(self.bounds)).sum())

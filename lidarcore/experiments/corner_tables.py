@@ -89,13 +89,13 @@ def maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str,
 
 
 def _aside(corners: Array) -> Array:
-    """A little farther from the sensor, where numbers do not hide corners."""
+    """Places for the numbers of corners: a little farther from the sensor, where they do not hide corners."""
     away: Array = corners * (1 + 0.35 / np.linalg.norm(corners, axis=1, keepdims=True))
     return away
 
 
 def heading(environment: Environment) -> str:
-    """Its name at the beginning of a sentence."""
+    """The name of an environment, as at the beginning of a sentence."""
     return environment.name[0].upper() + environment.name[1:]
 
 

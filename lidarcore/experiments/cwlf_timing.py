@@ -53,7 +53,7 @@ def walls_of(room: Room, noise: SensorNoise, measurements: int) -> tuple[Beams, 
 def uncertainty(
     method: str, walls: tuple[Beams, Beams], noise: SensorNoise, draws: int, seed: list[int]
 ) -> Uncertainty:
-    """Of the corner between true walls, seen `draws` times."""
+    """Uncertainty of the corner between true walls, seen `draws` times."""
     rng = np.random.default_rng(seed)
     truth, published = corner(METHODS[method], walls, noise)
     errors = [corner(METHODS[method], _noisy(walls, noise, rng), noise)[0] - truth for _ in range(draws)]

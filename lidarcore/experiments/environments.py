@@ -59,7 +59,7 @@ class Design:
 
     @property
     def settings(self) -> ExtractionSettings:
-        """Of the extraction."""
+        """Settings of the extraction."""
         return ExtractionSettings(noise=self.noise, split_threshold=self.split_threshold)
 
     def quick(self) -> "Design":
@@ -113,7 +113,7 @@ def look_at(scans: Sequence[Scan], design: Design, fitters: Sequence[str]) -> li
 
 
 def of_verdicts(design: Design, simulated_rooms: bool) -> list[str]:
-    """By what rules claims are judged; and of a recording the noise that is assumed, in sentences."""
+    """Sentences that say by what rules claims are judged and, of a recording, which noise is assumed."""
     return [RULES, *([design.assumption] if design.assumption and not simulated_rooms else [])]
 
 

@@ -82,7 +82,7 @@ def measurements(clusters: Clusters) -> Points:
 
 
 def dead_reckoned(drive: Perceived, clusters: Sequence[Clusters], noise: OdometryNoise) -> Track:
-    """By odometry alone; clusters are rotated into the world and have the covariance of the pose, too [EKF 17]."""
+    """The track by odometry alone; clusters, rotated into the world, have the covariance of the pose, too [EKF 17]."""
     covariances = [START]
     for before, after in pairwise(drive.odometry):
         u, last = relative(before, after), UncertainPose(before, covariances[-1])
@@ -111,7 +111,7 @@ def _placed(pose: Array, P: Array, clusters: Clusters) -> tuple[Array, Array]:
 
 
 def filtered(drive: Perceived, clusters: Sequence[Clusters | None], settings: LocalizationSettings) -> Track:
-    """By the SLAM filter on the clusters of each scan; None for a scan in which nothing was seen."""
+    """The track by the SLAM filter on the clusters of each scan; None for a scan in which nothing was seen."""
     slam = Slam(settings, drive.odometry[0], START)
     nothing = Points(np.empty((0, 2)), np.eye(2), "cluster")
     estimates = [
@@ -131,7 +131,7 @@ def filtered(drive: Perceived, clusters: Sequence[Clusters | None], settings: Lo
 
 
 def errors(track: Track, truth: Array, path: Path) -> Errors:
-    """Of a track along a path whose y is a function of its x, against the truth (N, 3)."""
+    """Errors of a track along a path whose y is a function of its x, against the truth (N, 3)."""
     difference = pose_difference(track.poses, truth)
     distance = np.hypot(difference[:, 0], difference[:, 1])
     nees = squared_mahalanobis(difference, track.covariances)

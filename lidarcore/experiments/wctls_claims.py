@@ -29,9 +29,9 @@ AREAS = (
 )
 """mm², median and spread of the per-scan median ellipse area by UTLS, WTLS, WCTLS."""
 GAINS = tuple(utls / wctls for (utls, _), _, (wctls, _) in AREAS)
-"""Of the median areas, UTLS over WCTLS: "approximately sevenfold", "approximately 2.3"."""
+"""Ratios of the median areas, UTLS over WCTLS: "approximately sevenfold", "approximately 2.3"."""
 FACTORS = ((3, 6), (2, 4))
-"""Of the standard deviations, UTLS over WCTLS: "approximately 3 to 6", "between 2 and 4"."""
+"""Ratios of the standard deviations, UTLS over WCTLS: "approximately 3 to 6", "between 2 and 4"."""
 _ANGLES = (
     "What the paper does not print is replaced by conditional variances, and these gain by the angles at which beams "
     "meet walls and by the bearing noise: the walls are others here, and the paper does not give that noise."

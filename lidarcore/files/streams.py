@@ -115,7 +115,7 @@ def available(stream: IO[bytes], size: int, most: int = MAX_RECORD) -> bytes:
 
 
 def gathered(stream: IO[bytes], size: int) -> bytearray:
-    """The same of a size that is known to be harmless, without a copy."""
+    """Read `size` bytes, known to be harmless, or what there is of them, piece by piece and without a copy."""
     data = bytearray()
     while piece := stream.read(min(size - len(data), MEBIBYTE)):
         data += piece

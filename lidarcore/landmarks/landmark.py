@@ -52,7 +52,7 @@ class Landmark:
 
     @classmethod
     def of(cls, xy: ArrayLike, covariance: ArrayLike, kind: str, **rest: Any) -> "Landmark":
-        """From a position (2,) m and its covariance (2, 2) m²; `rest` are the other fields.
+        """A landmark from a position (2,) m and its covariance (2, 2) m²; `rest` are the other fields.
 
         Raises LandmarkError, also for other shapes and a covariance that is not symmetric.
         """

@@ -124,7 +124,7 @@ class Neighbourhood:
     def _rows(
         self, columns: str, width: float, sigma: float, rest: str, parameters: dict[str, float]
     ) -> list[tuple[Any, ...]]:
-        """Of the landmarks about the square of this half-width (m) that may have this sigma or more."""
+        """Rows of the landmarks about the square of this half-width (m) that may have this sigma or more."""
         x, y = self._xy
         square = Box(x - width, y - width, x + width, y + width)
         uncertain = ("sigma_max >= :sigma", {"sigma": sigma})

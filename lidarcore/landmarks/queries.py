@@ -176,7 +176,7 @@ def _count(connection: sqlite3.Connection, session: int, box: Box, most: int) ->
 
 
 def joined(conditions: Iterable[Clauses]) -> Clauses:
-    """All conditions in one."""
+    """Conditions joined by AND to one."""
     given = list(conditions)
     parameters = {name: value for _, values in given for name, value in values.items()}
     return " AND ".join(clause for clause, _ in given if clause), parameters

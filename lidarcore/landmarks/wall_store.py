@@ -27,7 +27,7 @@ def replace_walls(connection: sqlite3.Connection, session: int, walls: Iterable[
 
 
 def walls_of(connection: sqlite3.Connection, session: int) -> list[StoredWall]:
-    """In the order of their ids."""
+    """The walls of a session in the order of their ids."""
     query = f"SELECT {_WALL} FROM walls WHERE session = ? ORDER BY id"
     return [StoredWall(*row) for row in connection.execute(query, (session,))]
 

@@ -131,7 +131,7 @@ _BAD_BEAM = 100
 
 
 def _along_the_wall(rho: Array, theta: Array) -> tuple[Array, Array]:
-    """The same beams in the order of the wall: neighbours share its unevenness."""
+    """Beams sorted along the wall: neighbours share its unevenness."""
     middle = np.angle(np.exp(1j * theta).sum())
     order = np.argsort((theta - middle + np.pi) % (2 * np.pi))
     return rho[order], theta[order]

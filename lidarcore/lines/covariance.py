@@ -146,13 +146,13 @@ def _pattern(
 
 @inlined
 def _gained(v: float, k00: float, k01: float, k11: float, a0: float, d: float) -> Sym2:
-    """Of (alpha, height over the mean), by sums over errors of variance v."""
+    """Covariance of (alpha, height over the mean), by sums over errors of variance v."""
     return v * k11 / (d * d), -v * k01 / (a0 * d), v * k00 / (a0 * a0)
 
 
 @inlined
 def resampled_sums(w: Array, t: Array, decay: Array, length: float) -> tuple[float, float, float]:
-    """The same sums as `unevenness_sums` of what differs if all beams fall elsewhere between their neighbours.
+    """The sums of `unevenness_sums`, of what differs if all beams fall elsewhere between their neighbours.
 
     With a = spacing / (2 length), and a shift of all beams that is anywhere within the spacing, the covariance of two
     such samples of one wall is that of the process times sinh(a) / a, but (1 - exp(-a)) / a of a beam with itself. What

@@ -131,7 +131,7 @@ class Continuity:
         return dt > 0
 
     def _across_break(self, settings: LocalizationSettings) -> Array:
-        """Of moving at any usual speed for as long as nothing is known."""
+        """Covariance (3, 3) of moving at any usual speed for as long as nothing is known."""
         first = self._chain[0]
         gap = first.stamp - self._recent[-1].stamp if self._recent else _PERIOD
         unknown = _PERIOD if gap <= 0 and self._goes_on(first, settings) else min(abs(gap), _LONGEST)

@@ -58,7 +58,7 @@ class Landmarks:
         )
 
     def subset(self, which: NDArray[np.bool_]) -> Self:
-        """Those of which (L,) is true."""
+        """The landmarks of which (L,) is true."""
         columns = {name: getattr(self, name)[which] for name in _COLUMNS}
         return type(self)(points=self.points.subset(which), **columns)
 

@@ -271,7 +271,7 @@ class Navigator:
         return NO_ODOMETRY if missing else None
 
     def _velocity(self, scan: Scan) -> Velocity | None:
-        """As odometry has it, if that moves the filter, else as the filter has it."""
+        """The sensor's velocity: by odometry, if that moves the filter, else by the filter."""
         if self._estimate.velocity is None or (self._filter and self._filter.settings.motion == "odometry"):
             return self._reckoning.velocity(scan)
         v, w = self._estimate.velocity.tolist()

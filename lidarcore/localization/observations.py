@@ -74,7 +74,7 @@ def corner_times(features: Features, beam_times: Array) -> Array:
 
 
 def nearest_moments(times: Array, beam_times: Array) -> Array:
-    """Each time (K,) replaced by the middle of that part of the revolution which it lies in."""
+    """Times (K,), each replaced by the middle of that part of the revolution which it lies in."""
     length = np.ptp(beam_times) / MOMENTS
     middles: Array = length * (np.floor(times / length).clip(0, MOMENTS - 1) + 0.5)
     return middles

@@ -66,7 +66,7 @@ class Points:
         return len(self.xy)
 
     def subset(self, which: NDArray[np.bool_] | Ints) -> Self:
-        """Those of which (K,) is true, or with these indices."""
+        """The points of which (K,) is true, or with these indices."""
         return self.with_new(self.xy[which], self.covariance[which], np.asarray(self.kinds)[which])
 
     def none(self) -> Self:

@@ -61,7 +61,7 @@ class TrackingResult:
         after: Landmarks,
         dead_reckoned: Array | None,
     ) -> Self:
-        """From the map before the scan, to which the association refers, and after it."""
+        """The result from the map before the scan, to which the association refers, and from the map after it."""
         association = estimate.association
         used = np.stack([association.observed, association.landmark], -1)
         return cls(

@@ -118,7 +118,7 @@ class LocateWorker:
             self.corrected = Corrected(np.array(self._poses), self._here.covariance)
 
     def _go_on(self, tracked: Tracked) -> None:
-        """To the next keyframe, by the front end alone."""
+        """Go on to the next keyframe, by the front end alone."""
         if tracked.first is not None:
             self._recent[-1] = tracked.first.scan, self._local
         if self._poses:

@@ -63,7 +63,7 @@ def angle(walls: Walls, first: Feature, second: Feature) -> Measurement:
 
 
 def length(walls: Walls, id: int) -> Measurement:
-    """Of a wall, from end to end; a lower bound where it may go on. Raises MeasureError."""
+    """Length of a wall, from end to end; a lower bound where it may go on. Raises MeasureError."""
     index = _place(walls, Feature("wall", id))
     return Measurement(float(walls.length[index]), float(np.sqrt(walls.length_variance[index])))
 
@@ -116,7 +116,7 @@ def _across(point: Array, wall: Array) -> float:
 
 
 def distance_of(a: Array, b: Array) -> float:
-    """Of corners (1, 2) or walls (2, 2), m, with a sign where a corner is on one side of a wall."""
+    """Distance (m) of corners (1, 2) or walls (2, 2), with a sign where a corner is on one side of a wall."""
     if len(a) == len(b) == 1:
         return float(np.hypot(*(a[0] - b[0])))
     if len(a) == 1 or len(b) == 1:

@@ -60,7 +60,7 @@ class Refined:
         return UncertainPose(relative(self.poses[i], self.poses[j]), (P + P.T) / 2)
 
     def _own(self, i: int) -> Array:
-        """That of pose i itself."""
+        """Covariance (3, 3) of pose i itself."""
         R = np.eye(3)
         R[:2, :2] = rotation(self.poses[i, 2])
         block: Array = self._block(i, i) + R @ self.sweeps[i] @ R.T

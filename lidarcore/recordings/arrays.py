@@ -74,7 +74,7 @@ class ArrayRecording(Recording):
         return 64 * MEBIBYTE + 2 * self.path.stat().st_size
 
     def _shaped(self, name: str, array: NDArray[Any], scans: int, beams: int) -> NDArray[Any]:
-        """One row for each scan."""
+        """An array with one row for each scan."""
         if name == "stamps" and array.size == scans:
             return array.reshape(scans)
         if name == "odometry" and array.size == 3 * scans:

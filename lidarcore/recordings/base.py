@@ -18,7 +18,7 @@ NOMINAL_PERIOD = 0.1
 """s between scans where a file does not say: the usual 10 Hz of a small lidar."""
 
 MOST_BEAMS = 1 << 18
-"""Of a scan: ten times those of the densest 2D lidar."""
+"""Beams of a scan at most: ten times those of the densest 2D lidar."""
 
 MOST_NOTES = 100
 """Kinds of oddities that are counted one by one."""

@@ -15,7 +15,7 @@ _RIGID = 1e-3  # m, rad: a mounting that varies by more is none
 
 
 class Survey:
-    """Of the readings of a laser.
+    """What the readings of a laser say of it.
 
     beams       numbers of beams in readings without bearings
     largest     the largest range below SICK_RANGE in m, and `ties`, how often it occurs

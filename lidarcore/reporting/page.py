@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 Agreement = bool | None | Literal["not comparable"]
-"""Of a claim with what was measured; None: open."""
+"""Whether a claim agrees with what was measured; None: open."""
 NOT_COMPARABLE: Literal["not comparable"] = "not comparable"
 _VERDICTS: dict[Agreement, tuple[str, str]] = {
     True: ("agrees", "agrees"),

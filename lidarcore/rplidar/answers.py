@@ -43,7 +43,7 @@ class Descriptor:
 
     @classmethod
     def decode(cls, data: bytes) -> "Descriptor | None":
-        """From exactly 7 bytes; None if they are not a descriptor."""
+        """Decode exactly 7 bytes; None if they are not a descriptor."""
         if len(data) != cls.SIZE or not data.startswith(cls.SYNC):
             return None
         word, kind = struct.unpack("<IB", data[2:])
@@ -79,7 +79,7 @@ class DeviceInfo:
 
     @classmethod
     def decode(cls, data: bytes) -> "DeviceInfo":
-        """From 20 bytes. Raises ValueError for another number of them."""
+        """Decode 20 bytes. Raises ValueError for another number of them."""
         _check_size("device info", data, cls.SIZE)
         return cls(data[0], (data[2], data[1]), data[3], data[4:].hex().upper())
 
@@ -114,7 +114,7 @@ class Health:
 
     @classmethod
     def decode(cls, data: bytes) -> "Health":
-        """From 3 bytes. Raises ValueError for another number of them."""
+        """Decode 3 bytes. Raises ValueError for another number of them."""
         _check_size("health", data, cls.SIZE)
         return cls(*struct.unpack("<BH", data))
 

@@ -87,7 +87,7 @@ class Emulator:
                 self._send(self._faults.damage(packet, self._device.packet_size))
 
     def _send(self, data: bytes) -> None:
-        """As the client hears it: garbage if it listens at another speed."""
+        """Send bytes as the client hears them: garbage if it listens at another speed."""
         self._terminal.write(data if self._speed_fits() else self._rng.bytes(len(data)))
 
     def _speed_fits(self) -> bool:

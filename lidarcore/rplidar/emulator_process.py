@@ -55,7 +55,7 @@ class EmulatorProcess:
 
     @property
     def pid(self) -> int:
-        """Of the process."""
+        """Id of the process."""
         return self._process.pid
 
     def command(self, line: str) -> None:

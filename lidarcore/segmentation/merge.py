@@ -69,7 +69,7 @@ def _cost_after(
 
 @inlined
 def cost_of_joining(a: Array, b: Array, noise: NoiseModel, joined: Array) -> float:
-    """By how much the chi-square of the residuals grows if one line serves both pieces.
+    """Growth of the chi-square of the residuals if one line serves both pieces.
 
     Taken with each piece's own variance, or all with the variance of the joined one, whichever is less: the first
     errs high on a long wall close by, whose variance differs along it; the second on short pieces, whose best lines

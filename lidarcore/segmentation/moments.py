@@ -50,7 +50,7 @@ def moments_of(points: Array, first: Ints, last: Ints, m: Array, count: int, tri
 
 @inlined
 def copy(row: Array, out: Array) -> None:
-    """Entry by entry: an assignment of whole rows compiles a check of their shapes, which takes seconds."""
+    """Copy a row entry by entry: an assignment of whole rows compiles a check of their shapes, which takes seconds."""
     for i in range(MOMENTS):
         out[i] = row[i]
 

@@ -78,7 +78,7 @@ def split(
 
 @inlined
 def variance(rho: float, across: float, along: float, noise: NoiseModel) -> float:
-    """Of a point's distance from a line: its coordinate `along` it, its beam at cos(incidence) `across`."""
+    """Variance of a point's distance from a line: its coordinate `along` it, its beam at cos(incidence) `across`."""
     square = rho * rho
     v_rho = noise.v_rho + noise.growth * square * square
     return v_rho * across * across + noise.v_theta * along * along + noise.v_wall

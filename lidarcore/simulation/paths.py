@@ -12,7 +12,7 @@ ROUND = 60.0  # s for one round of the figure of eight
 
 
 def standing(times: Array) -> Array:
-    """On one spot of the furnished room from which many corners are in view."""
+    """Poses on one spot of the furnished room from which many corners are in view."""
     return np.tile([7.6, 4.4, 0.0], (len(times), 1))
 
 

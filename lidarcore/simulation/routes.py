@@ -13,7 +13,7 @@ _PIVOT = 64  # steps of half a turn on the spot
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Of a robot: speed m/s, turn rate rad/s, and acceleration m/s².
+    """Limits of a robot: speed m/s, turn rate rad/s, and acceleration m/s².
 
     A turn accelerates as the way that takes as long at full speed.
     """

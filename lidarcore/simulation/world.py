@@ -18,7 +18,7 @@ class World:
     surface: Surface | None = None
 
     def uneven(self, noise: SensorNoise, seed: int) -> "World":
-        """The same with walls as uneven as the noise says; as they are if it says nothing of that."""
+        """This world with walls as uneven as the noise says; unchanged if it says nothing of unevenness."""
         if not noise.unevenness:
             return self
         surface = Surface.of(self.walls, noise.unevenness, noise.unevenness_length, seed)
@@ -44,7 +44,7 @@ class World:
     def _farther(
         self, surface: Surface, hit: Ints, x: Array, y: Array, directions: Array, ranges: Array
     ) -> Array:
-        """By how much (N,) m beams go on, where they meet the surface instead of the line; to first order."""
+        """How much farther (N,) m beams go where they meet the surface instead of the line, to first order."""
         start, along = self.walls[hit, 0], self.walls[hit, 1] - self.walls[hit, 0]
         along = along / np.hypot(along[:, 0], along[:, 1])[:, None]
         ux, uy = np.cos(directions), np.sin(directions)

@@ -167,7 +167,7 @@ def odometry(
 
 
 def _poses(body: Any) -> list[OdometryPose]:
-    """One or some; a union of both would complain about both. Raises pydantic.ValidationError."""
+    """One pose or several; a union of both would complain about both. Raises pydantic.ValidationError."""
     if isinstance(body, list):
         return TypeAdapter(list[OdometryPose]).validate_python(body)
     return [OdometryPose.model_validate(body)]

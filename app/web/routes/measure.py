@@ -55,7 +55,7 @@ class MeasuredFeatureJson(TypedDict):
 
 
 class MeasureJson(TypedDict):
-    """By the main method: m and rad, one sigma; `angle` is null unless both are walls."""
+    """A measurement by the main method: m and rad, one sigma; `angle` is null unless both are walls."""
 
     first: MeasuredFeatureJson
     second: MeasuredFeatureJson
@@ -121,7 +121,7 @@ def _nearest(frame: Frame, place: str) -> _Found:
 
 
 def _of_scan(frame: Frame, kind: str, at: Array) -> _Candidates:
-    """Those of the main method."""
+    """Corners or walls of the scan by the main method, with their numbers and places."""
     if kind == "corner":
         main = next(iter(frame.features))
         ids = {row.index[main]: row.id for row in frame.corners if main in row.index}

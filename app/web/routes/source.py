@@ -63,7 +63,7 @@ _SIMULATION = TypeAdapter(SimulationSettings)
 
 
 def _strictly(settings: object) -> object:
-    """As the JSON that it was: in Python, strict would also refuse what a dictionary says of a record."""
+    """Settings, checked as JSON: in Python, strict would also refuse what a dictionary says of a record."""
     return (
         _SIMULATION.validate_json(json.dumps(settings), strict=True)
         if isinstance(settings, dict)

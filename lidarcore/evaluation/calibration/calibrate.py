@@ -99,11 +99,11 @@ class Calibration:
 
     @property
     def noise(self) -> SensorNoise:
-        """For the settings of extraction: what could be told, and the default of SensorNoise where nothing could."""
+        """The calibrated noise, for the settings of extraction; SensorNoise's default where nothing could be told."""
         return self.noise_or(SensorNoise())
 
     def noise_or(self, other: SensorNoise) -> SensorNoise:
-        """The same with what another noise says, such as the one in use, where nothing could be told.
+        """The calibrated noise, with the values of another one, such as that in use, for what could not be told.
 
         But not more than could have been overlooked. Growth and unevenness that are not seen are none; the systematic
         part is never seen by a sensor at rest.
@@ -135,7 +135,7 @@ class Calibration:
 
 
 def calibrate(scans: Iterable[Scan]) -> Calibration:
-    """From scans (at least 10, rather 100) of a sensor that stands still before walls.
+    """Calibrate a sensor by scans (at least 10, rather 100) that it took while it stood still before walls.
 
     On a wall, an error of the bearing acts on the range with the lever rho tan(incidence): the variance of white errors
     is sigma_range² + growth² rho⁴ + lever² sigma_bearing², and differences of neighbouring beams show it, in which the
@@ -221,7 +221,7 @@ def _profiles(scans: list[Scan], assumed: float, white: tuple[Interval, Interval
 
 
 def _drift(beams: WallBeams, scans: int) -> float:
-    """By how much (m) the wall that moved most did so, from the first third of the scans to the last."""
+    """How far (m) the wall that moved most did so, from the first third of the scans to the last."""
     third = scans // 3
     early, late = beams.scan < third, beams.scan >= scans - third
     moved = [

@@ -36,7 +36,7 @@ def _of_unevenness(rho: Array, slope: Array, step: Array, noise: SensorNoise) ->
 
 
 def contradiction(seen: float, expected: float) -> str | None:
-    """In words, if the noise seen (m) is not what is expected (m)."""
+    """Says in words that the noise seen (m) is not what is expected (m); None if it is."""
     if not expected or AGREES[0] <= seen / expected <= AGREES[1]:
         return None
     return f"Ranges scatter by {1e3 * seen:.0f} mm, set to {1e3 * expected:.0f}."

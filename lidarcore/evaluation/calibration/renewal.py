@@ -80,7 +80,7 @@ def _shifts(before: Array, after: Array) -> Array:
 
 
 def _sightings(scans: list[Scan], noise: SensorNoise, share: float) -> dict[int, Array]:
-    """By wall (N, 6): alpha rad, r m, and their covariance, if that share is sampled anew."""
+    """Each wall's observations (N, 6): alpha rad, r m, their covariance if that share is sampled again in each scan."""
     told = {name: getattr(noise, name) for name in noise.__dataclass_fields__} | {"renewal": share}
     settings = ExtractionSettings(noise=SensorNoise(**told))
     tracker, seen = WallTracker(memory=len(scans), follow=0.1), dict[int, list[Array]]()

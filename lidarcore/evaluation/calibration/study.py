@@ -27,7 +27,7 @@ class Cell:
         return share(*np.array([one.held[of] for one in self.trials]).T)
 
     def scatter(self, corners: bool) -> Figures | None:
-        """Of the standing sensor."""
+        """Scatter of corners or walls against their claims, while the sensor stands still."""
         parts = [one.corners if corners else one.walls for one in self.trials]
         known = [part for part in parts if part is not None]
         return Figures.together(known) if known else None
@@ -59,11 +59,11 @@ class CalibrationStudy:
 
     @property
     def trials(self) -> list[Trial]:
-        """Those of all cells."""
+        """Trials of all cells."""
         return [one for cell in self.cells for one in cell.trials]
 
     def parts(self, cell: Cell | None = None) -> Iterator[Part]:
-        """Of all rooms, or of one cell."""
+        """The parts of the noise, over all rooms or over those of one cell."""
         trials = self.trials if cell is None else cell.trials
         for name in PARTS:
             found = _known(name, [(one.parts, one.truth) for one in trials])

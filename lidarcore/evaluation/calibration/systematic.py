@@ -31,7 +31,7 @@ class WallShape:
 
 
 def wall_shapes(beams: WallBeams, sigma_bearing: float) -> list[WallShape]:
-    """Those of all walls with bins enough.
+    """Shapes of all walls with enough bins.
 
     The mean range at a bearing that scatters by sigma_bearing (rad) is too long by the curvature of rho: taken out.
     Off the wall along its normal, not along the beam: walls are uneven in that way, whatever the incidence.
@@ -85,7 +85,7 @@ def alignment(walls: list[WallShape], bias: float = 0.0) -> Interval | None:
 
 
 def _quarter(angle: Array) -> Array:
-    """The same up to quarter turns, within ± pi / 4."""
+    """An angle (rad) less its quarter turns, within ± pi / 4."""
     return (angle + np.pi / 4) % (np.pi / 2) - np.pi / 4
 
 

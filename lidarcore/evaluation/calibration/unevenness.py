@@ -39,7 +39,7 @@ class Profile:
 
 
 def profiles(beams: WallBeams, variance: Array) -> Iterator[Profile]:
-    """Those of all walls long enough; variance (N,) m² is that of the beams' ranges."""
+    """Profiles of all walls that are long enough; variance (N,) m² is that of the beams' ranges."""
     for wall in np.unique(beams.wall):
         on = beams[beams.wall == wall]
         v = variance[beams.wall == wall]

@@ -50,7 +50,7 @@ class WallBeams:
 
 
 def beams_on_walls(scans: list[Scan], unevenness: float = 0.0) -> WallBeams:
-    """Those of all scans, sorted in bins along the walls and by bearing in each.
+    """Beams of all scans on walls, sorted in bins along the walls and by bearing in each.
 
     unevenness m: walls are told apart by it, if it is given. Raises EvaluationError if no walls are seen.
     """

@@ -26,8 +26,8 @@ _AROUND = 4  # neighbours on each side whose median a beam is held against
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scatter:
-    """Of M bins: variance (M,) m² of white errors, degrees of freedom, means of lever² m², range m and range⁴ m⁴, and
-    of incidence rad."""
+    """Scatter in M bins: variance (M,) m² of white errors, degrees of freedom, means of lever² m², range m and range⁴
+    m⁴, and of incidence rad."""
 
     variances: Array
     dof: Array

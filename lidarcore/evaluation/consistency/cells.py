@@ -16,7 +16,7 @@ COLUMNS = {
     "anees": ("ANEES", 1.0, 2),
     "area_ratio": ("area", 1.0, 3),
 }
-"""By figure: heading, factor, digits."""
+"""Heading, factor and digits of each figure."""
 
 
 def cell(figure: Interval, factor: float, digits: int) -> str:

@@ -60,7 +60,7 @@ class Design:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Of the sums of one chunk: segmentations, fitters, kinds of covariance, sums."""
+        """Shape of the sums of one chunk: segmentations, fitters, kinds of covariance, sums."""
         return len(self.segmentations), len(FITTERS), len(KINDS), len(SUMS)
 
 

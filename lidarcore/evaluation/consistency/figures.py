@@ -40,7 +40,7 @@ class Figure:
     kind: Literal["mean", "root", "share"] = "mean"
 
     def of(self, blocks: Array) -> Interval:
-        """With its confidence interval, from independent blocks of sums (B, len(SUMS))."""
+        """The figure with its confidence interval, from independent blocks of sums (B, len(SUMS))."""
         over, under = (blocks[:, SUMS.index(name)] for name in (self.numerator, self.denominator))
         if self.kind == "share":
             return share(over, under)

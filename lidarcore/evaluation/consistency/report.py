@@ -62,7 +62,7 @@ def _at(rows: Iterable[Row], noise: SensorNoise) -> list[Row]:
 
 
 def _summary(overall: Sequence[Row], by_room: Sequence[Row]) -> str:
-    """As a table for each segmentation, then for every noise in words."""
+    """What can be believed: a table for each segmentation, then for every noise in words."""
     segmentations = list(dict.fromkeys(row.segments for row in overall))
     noises = list(dict.fromkeys(row.noise for row in overall))
     tables = "".join(_believed([row for row in overall if row.segments == s], noises) for s in segmentations)

@@ -50,21 +50,21 @@ class Consistency:
         return int(self.sums[..., 0, 0, SUMS.index("trials")].sum())
 
     def rows(self) -> Iterator[Row]:
-        """Every method in every room, and in all rooms together if there are several."""
+        """The figures of every method in every room, and in all rooms together if there are several."""
         for r, name in enumerate(self.design.rooms):
             yield from self._rows(name, self.sums[r])
         if len(self.design.rooms) > 1:
             yield from self.pooled()
 
     def pooled(self) -> Iterator[Row]:
-        """Every method in all rooms together."""
+        """The figures of every method in all rooms together."""
         name = ALL_ROOMS if len(self.design.rooms) > 1 else self.design.rooms[0]
         return self._rows(name, self.sums.sum(0))
 
     def row(
         self, room: str, noise: SensorNoise, segments: Segmentation, fitter: str, covariance: Covariance
     ) -> Row:
-        """One of them. Raises KeyError if it is not in the study."""
+        """The figures of one method in one room. Raises KeyError if they are not in the study."""
         wanted = (room, noise, segments, fitter, covariance)
         for row in self.rows():
             if (row.room, row.noise, row.segments, row.fitter, row.covariance) == wanted:

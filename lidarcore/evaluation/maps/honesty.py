@@ -135,7 +135,7 @@ def judge(scans: Sequence[Scan]) -> Run:
 
 
 def _runs(seconds: float, seed: int, chunk: tuple[str, int]) -> dict[str, Run]:
-    """The same drive with every kind of odometry."""
+    """Maps of one drive with every kind of odometry, judged."""
     world, number = chunk
     scans = drive(world, seconds, int(np.random.SeedSequence([seed, number]).generate_state(1)[0]))
     blind = [replace(scan, odometry=None) for scan in scans]

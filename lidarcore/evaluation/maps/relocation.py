@@ -51,7 +51,7 @@ class Attempts:
 
     @property
     def share_found(self) -> float:
-        """Of the queries from places that the map knows, the share that was found, and rightly."""
+        """Share of the queries from places that the map knows that was found, and rightly."""
         return float((self.found & ~self.wrong)[self.inside].mean()) if self.inside.any() else float("nan")
 
 

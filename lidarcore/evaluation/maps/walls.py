@@ -106,7 +106,7 @@ def _line_chi2(walls: Walls, i: int, true: Array) -> float:
 
 
 def _views(world: World, wall: Array, poses: Array) -> int:
-    """From how many poses at least half of a wall is in view, and not at too grazing an angle."""
+    """Number of poses from which at least half of a wall is in view, and not at too grazing an angle."""
     points = wall[0] + np.linspace(0.02, 0.98, 25)[:, None] * (wall[1] - wall[0])
     across = (wall[1] - wall[0])[::-1] * [-1, 1] / np.hypot(*(wall[1] - wall[0]))
     views = 0

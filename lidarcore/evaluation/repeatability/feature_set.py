@@ -38,7 +38,7 @@ class FeatureSet:
         )
 
     def with_systematic(self, sigma: float) -> "FeatureSet":
-        """The same with a part that is the same in every scan from one place: of all walls, and so of the corners.
+        """These features with a systematic part, the same in every scan from one place, in walls and so in corners.
 
         The wall as a whole is off by sigma m, and its ends against each other by twice that.
         """

@@ -47,7 +47,7 @@ class Observations:
         return Observations(self.ids[n:], self.scans[n:], self.table[n:])
 
     def followed_by(self, other: "Observations") -> "Observations":
-        """These, then others."""
+        """These observations, then others."""
         return Observations(
             np.concatenate([self.ids, other.ids]),
             np.concatenate([self.scans, other.scans]),
@@ -98,7 +98,7 @@ class Scatter:
         return _root_det(covariances(self.means))
 
     def features(self) -> list[tuple[FeatureScatter, ...]]:
-        """By method those that it saw often enough, by their ids."""
+        """The features that each method saw often enough, in the order of their ids."""
         method, good = np.nonzero(self.counts.T >= LEAST)
         at = good, method
         n, actual = self.counts[at], self.actual[at]
@@ -129,7 +129,7 @@ class Scatter:
         return (dict(zip(KINDS, by_kind, strict=True)) for by_kind in _batched(claims, len(KINDS)))
 
     def judgements(self) -> list[tuple[Judgement, ...]]:
-        """By method and kind all features together: the sum of their areas, and the share of all residuals.
+        """All features together, judged by method and kind: the sum of their areas, and the share of all residuals.
 
         The interval of coverage is made of the scatter between scans, whose errors are independent. That of areas takes
         the scatter for Gaussian and independent from one to another (Satterthwaite for the sum of their areas).

@@ -114,7 +114,7 @@ class WallMethod(Method):
 
 @dataclass(frozen=True, slots=True)
 class WallSummary:
-    """Of walls, what `Summary` tells of corners."""
+    """Repeatability of walls; its fields are those of `Summary`, which tells of corners."""
 
     window: int
     scans: int

@@ -20,7 +20,7 @@ def write(summary: Summary, path: Path) -> None:
 
 
 def to_json(summary: Summary) -> str:
-    """All of it, null for what cannot be told yet."""
+    """A summary as JSON, null for what cannot be told yet."""
     return json.dumps(finite(asdict(summary)), indent=1, allow_nan=False) + "\n"
 
 
@@ -61,5 +61,5 @@ def _lines(summary: Summary) -> Iterator[dict[str, Any]]:
 
 
 def finite(document: Any) -> Any:
-    """The same with None for every number that is not finite."""
+    """A document for JSON with None for every number that is not finite."""
     return json.loads(json.dumps(document), parse_constant=lambda _: None)

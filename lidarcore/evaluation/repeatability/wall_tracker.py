@@ -69,7 +69,7 @@ class WallTracker:
         self._known, self._frame, self._next_id = _Known.nothing(), 0, 1
 
     def forget(self) -> None:
-        """Another scene: no wall of it is one seen before. Ids are never used again."""
+        """Forget all walls: those of another scene are new. Ids are never used again."""
         self._known = _Known.nothing()
 
     def rows(self, features: Mapping[str, Features]) -> tuple[WallRow, ...]:
@@ -132,7 +132,7 @@ def told_near(sightings: Array, near: Array) -> Array:
 
 
 def _pieces(features: Mapping[str, Features]) -> list[dict[str, int]]:
-    """For each piece {method: its index there}."""
+    """The pieces of the scan, each as {method: its index there}."""
     pieces: dict[tuple[int, int], dict[str, int]] = {}
     for name, found in features.items():
         segments = found.segments

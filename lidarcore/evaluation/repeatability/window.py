@@ -60,7 +60,7 @@ class FeatureWindow:
         self._added += 1
 
     def observations(self) -> Observations:
-        """All of the window, sorted by feature."""
+        """All observations in the window, sorted by feature."""
         nothing = np.empty((0, len(self.methods), OBSERVATION))
         return self._sorted(np.concatenate([nothing, *(record.table for record in self._records)]))
 
@@ -121,13 +121,13 @@ class FeatureWindow:
 
 
 def _centred(pairs: Array) -> Array:
-    """From their mean, those that are not NaN."""
+    """The pairs that are not NaN, as deviations from their mean."""
     found: Array = pairs[np.isfinite(pairs[:, 0])]
     return found - found.mean(0) if len(found) else found
 
 
 def _medians(values: Array) -> Array:
-    """Over the first axis, without NaN; NaN where there is nothing else."""
+    """Medians over the first axis, without NaN; NaN where there is nothing else."""
     ordered = np.sort(values, axis=0)  # NaN last
     n = np.isfinite(values).sum(0)
     padded, rest = np.concatenate([ordered, np.full((1, *n.shape), np.nan)]), tuple(np.indices(n.shape))
@@ -136,7 +136,7 @@ def _medians(values: Array) -> Array:
 
 
 def _boxes(values: Array) -> Iterator[Box | None]:
-    """Of each column of (N, C) without NaN; None for one where there is nothing else."""
+    """A box plot's figures of each column of (N, C) without NaN; None for one where there is nothing else."""
     ordered = np.sort(values, axis=0)  # NaN last
     counts = np.isfinite(values).sum(0)
     quartiles = np.full((3, len(counts)), np.nan)

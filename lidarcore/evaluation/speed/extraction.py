@@ -20,7 +20,7 @@ NOISE = SensorNoise(0.01, 0.001)
 REAL = replace(
     NOISE, range_growth=0.0003, unevenness=0.004, systematic=0.003, tails=0.25, renewal=0.1, resampling=1.0
 )
-"""The same with every part that real walls and rooms add."""
+"""The noise of the papers with every part that real walls and rooms add."""
 MODEL_LIMIT = 1.6  # times the compiled call with simple noise: at most so much it may take with all of it
 BEAMS = 920
 

@@ -12,7 +12,7 @@ from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
 LIMIT_US = 10_000.0
-"""For a scan and a new summary: a tenth of a core at 10 Hz."""
+"""Limit for a scan and a new summary: a tenth of a core at 10 Hz."""
 
 
 def time_repeatability(seed: int = 0) -> list[Timing]:

@@ -44,11 +44,11 @@ class Agreement:
 
 @dataclass(frozen=True, slots=True)
 class AgreementStudy:
-    """Of two claims, and of the second with a part that the other half of the pairs of stations told.
+    """Agreement under two claims, and under the second with a part that the other half of the pairs of stations told.
 
     consistent    what scatters if nothing moves
     map           what is not known of where the wall is, by its unevenness
-    systematic    the same with the systematic part
+    systematic    what is not known of where the wall is, with the systematic part
     """
 
     consistent: Agreement

@@ -31,7 +31,7 @@ def standstills(scans: Iterable[Scan]) -> list[list[Scan]]:
 
 
 def _stretches(table: Array) -> Iterator[tuple[int, int]]:
-    """From and to of each, of mean ranges (N, _SECTORS) m."""
+    """Where each stretch without motion begins and ends, from mean ranges (N, _SECTORS) m."""
     moving, steps = _shift(table, _AROUND) > _STILL, _shift(table, 1)
     edges = np.flatnonzero(np.diff(moving, prepend=False, append=False)).reshape(-1, 2)
     begin = 0

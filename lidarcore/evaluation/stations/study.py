@@ -43,7 +43,7 @@ class Figures:
 
     @classmethod
     def of(cls, found: Scatter, kind: int, window: int, station: int) -> "Figures":
-        """Those of one window."""
+        """Figures of one window."""
         good = found.counts >= LEAST
         some = good.any(1)
         numbers = np.ones(int(some.sum()), np.int64)
@@ -59,7 +59,7 @@ class Figures:
 
     @classmethod
     def together(cls, parts: Sequence["Figures"]) -> "Figures":
-        """Those of several windows, whose numbers are different."""
+        """Figures of several windows together; the numbers of the windows differ."""
         columns = [[getattr(part, field.name) for part in parts] for field in fields(cls)]
         return cls(*(np.concatenate(column) for column in columns))
 
@@ -67,7 +67,7 @@ class Figures:
         return len(self.counts)
 
     def __getitem__(self, which: NDArray[np.bool_]) -> "Figures":
-        """Those of some features."""
+        """Figures of the chosen features (F,)."""
         return Figures(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def stands(self, method: int) -> bool:

@@ -41,7 +41,7 @@ class Association:
 
     @classmethod
     def none(cls, observed: int) -> "Association":
-        """Of this many observations, with no landmark."""
+        """An association of so many observations with no landmark."""
         nothing, no_pairs = np.empty(0, np.int64), np.empty((0, 2), np.int64)
         return cls(nothing, nothing, no_pairs, no_pairs, np.arange(observed), nothing)
 

@@ -79,7 +79,7 @@ class Estimate:
 
     @classmethod
     def of(cls, stamp: float, state: Array, P: Array, innovation: Innovation) -> "Estimate":
-        """From the state of a motion model and its covariance."""
+        """An estimate from the state of a motion model and its covariance."""
         if len(state) == 3:
             return cls(stamp, state.copy(), P.copy(), None, innovation)
         return cls(stamp, state[:3].copy(), P[:3, :3].copy(), state[3:5].copy(), innovation, float(state[5]))
@@ -90,7 +90,7 @@ class Estimate:
 
 
 def no_innovation(observed: int) -> Innovation:
-    """Of so many observations that were not used."""
+    """The innovation of so many observations that were not used."""
     return Innovation(Association.none(observed), np.empty((0, 2)), np.empty((0, 0)))
 
 

@@ -23,11 +23,11 @@ class Filter(Protocol):
 
     @property
     def settings(self) -> LocalizationSettings:
-        """With the motion model in use."""
+        """The settings, with the motion model in use."""
 
     @property
     def map(self) -> Landmarks:
-        """As it is now."""
+        """The map as it is now."""
 
     @property
     def is_at_odds(self) -> bool:
@@ -53,7 +53,7 @@ class Filter(Protocol):
         visible: Visible | None,
         times: Array | None,
     ) -> Estimate:
-        """As Slam.step."""
+        """One scan, as in `Slam.step`."""
 
 
 def make_filter(

@@ -120,7 +120,7 @@ class KnownMap:
         self.restart_clock = self._localizer.restart_clock
 
     def reset(self, pose: ArrayLike, covariance: ArrayLike) -> None:
-        """As Slam.reset."""
+        """Go on from a pose (3,) with covariance (3, 3), as `Slam.reset` does."""
         self._localizer.reset(pose, covariance)
         self._pose, self._covariance = np.asarray(pose, np.float64), np.asarray(covariance, np.float64)
 
@@ -132,7 +132,7 @@ class KnownMap:
         visible: Visible | None = None,
         times: Array | None = None,
     ) -> Estimate:
-        """As Slam.step; nothing is ever added to the map or dropped from it."""
+        """One scan, as in `Slam.step`; nothing is ever added to the map or dropped from it."""
         estimate = self._localizer.step(observed, stamp, odometry, times)
         self._pose, self._covariance = estimate.pose, estimate.covariance
         if visible is not None:
@@ -150,12 +150,12 @@ class KnownMap:
         return estimate
 
     def displace(self, increment: Array, covariance: Array) -> None:
-        """As Slam.displace."""
+        """Move by an increment (3,) seen from the sensor, with its covariance (3, 3), as `Slam.displace` does."""
         here = UncertainPose(self._pose, self._covariance)
         self._pose, self._covariance = here.compose(UncertainPose(increment, covariance))
         self.reset(self._pose, self._covariance)
 
     def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
-        """As Slam.drive_by."""
+        """Predict by this from now on, as `Slam.drive_by` does."""
         self._localizer.drive_by(motion)
         self.settings = self._localizer.settings

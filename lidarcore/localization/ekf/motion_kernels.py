@@ -135,13 +135,13 @@ def advance_by_odometry(x: Array, P: Array, n: int, dt: float, increment: Array,
 def advance_by_odometry_with_velocity(
     x: Array, P: Array, n: int, dt: float, increment: Array, noise: Array, rates: Array
 ) -> None:
-    """`by_odometry_with_velocity`, in place as above."""
+    """`by_odometry_with_velocity` for a mean x (n,) and covariance P (n, n) that begin with the state, in place."""
     state, F, Q = by_odometry_with_velocity(x[:6], dt, increment, noise, rates)
     propagate(x, P, n, state, F, Q)
 
 
 @kernel
 def advance_at_constant_velocity(x: Array, P: Array, n: int, dt: float, rates: Array) -> None:
-    """`at_constant_velocity`, in place as above."""
+    """`at_constant_velocity` for a mean x (n,) and covariance P (n, n) that begin with the state, in place."""
     state, F, Q = at_constant_velocity(x[:6], dt, rates)
     propagate(x, P, n, state, F, Q)

@@ -89,7 +89,7 @@ class Passive:
         return rows
 
     def forget(self, columns: Ints) -> None:
-        """These coordinates are not passive any more."""
+        """Take coordinates out of the passive ones."""
         self._W[:, columns] = 0.0
 
     @one_thread

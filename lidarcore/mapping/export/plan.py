@@ -39,7 +39,7 @@ def plan_svg(walls: Walls, path: Array) -> str:
 
 
 def plan_dxf(walls: Walls, path: Array) -> str:
-    """The same as a DXF (R2010) in metres, with the layers WALLS, CORNERS and PATH."""
+    """A floor plan as a DXF (R2010) in metres, with the layers WALLS, CORNERS and PATH."""
     import ezdxf  # here: importing it takes a second, and a server that starts needs none
 
     document = ezdxf.new("R2010", units=ezdxf.units.M)

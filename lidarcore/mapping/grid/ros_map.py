@@ -152,7 +152,7 @@ def _read_image(path: Path, header: _Header) -> Cells:
 
 
 def _codes(image: Image.Image, is_deep: bool) -> Ints:
-    """Of each pixel (H, W) its brightness, from 0 to 65535 or the sum of its three colours, times 256; its opacity."""
+    """A number for each pixel (H, W): brightness (0 to 65535, or the sum of three colours) times 256, plus opacity."""
     pixels: Ints = np.asarray(image if is_deep else image.convert("RGBA")).astype(np.int64)
     brightness: Ints = pixels.clip(0, 65535) if is_deep else pixels[..., :3].sum(axis=-1)
     return brightness << 8 | (_OPAQUE if is_deep else pixels[..., 3])

@@ -24,7 +24,7 @@ _MARGIN = 1 << (LEVELS - 1)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Field:
-    """Of an H x W part of a grid, with a margin:
+    """An H x W part of a grid with a margin, ready to be searched for a pose:
 
     levels  (LEVELS, H, W) best fit of the square of 2^level cells that begins at a cell
     room    (LEVELS, H, W) 1 where such a square holds a cell in which a sensor may be

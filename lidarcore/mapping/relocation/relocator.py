@@ -81,10 +81,11 @@ class Relocator:
         return found or _nowhere("no fit")
 
     def find_near(self, query: Query, guess: UncertainPose) -> Relocation:
-        """Likewise, within three standard deviations of a guess T_world_sensor; if it is not there, how well that fits.
+        """Where the last scan of a query was taken, within three standard deviations of a guess T_world_sensor.
 
-        Only places near the guess are rivals. Rays that the map contradicts weigh against a place, but forbid none:
-        something may have changed since the map was made.
+        If it is not found there, the answer says how well the guess itself fits. Only places near the guess are
+        rivals. Rays that the map contradicts weigh against a place, but forbid none: something may have changed since
+        the map was made.
         """
         angles, at = self._angles(query), self._in_field(guess.pose)
         if len(query.points) < self.settings.least_points:

@@ -78,7 +78,7 @@ def wall_model(
     keyframes: int,
     systematic: float,
 ) -> WallModel:
-    """Of walls with their own ends, of which those in corners are replaced; systematic (m) is SensorNoise's."""
+    """A model of walls with their own ends, those in corners replaced; systematic (m) is that of SensorNoise."""
     blocks = [_noise(part, pair, systematic) for part, pair in zip(parts, ends, strict=True)]
     rows = _line_rows(parts) + _end_rows(parts, ends, intersections)
     noise = csr_array(block_diag(blocks, format="csr")) if blocks else csr_array((0, 0))

@@ -1,4 +1,4 @@
-"""What tells a wall from all others, however the map is bent: which stretches of which segments it was seen by.
+"""Observations of walls: by what stretches of segments a wall is told from all others, however the map is bent.
 
 A segment is found in the scan of one keyframe, so its number and where it begins do not change with any pose.
 """
@@ -33,12 +33,12 @@ class Observations:
 
     @classmethod
     def none(cls) -> "Observations":
-        """Of no wall."""
+        """Observations of no wall."""
         return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2)))
 
     @classmethod
     def of(cls, pieces: Pieces, parts: Sequence[Part]) -> "Observations":
-        """Of walls by their place in the list: of each of its segments what lies between its ends."""
+        """Observations of walls, by their place in the list: what of each of its segments lies between its ends."""
         found = [cls.none()]
         for i, part in enumerate(parts):
             t, _ = part.fit.coordinates(pieces.ends[part.members])
@@ -50,7 +50,7 @@ class Observations:
 
     @classmethod
     def joined(cls, several: Sequence["Observations"]) -> "Observations":
-        """All of them, one after the other."""
+        """The observations of several, one after the other."""
         return cls(
             np.concatenate([one.wall for one in several]),
             np.concatenate([one.segment for one in several]),
@@ -58,11 +58,11 @@ class Observations:
         )
 
     def where(self, chosen: Mask) -> "Observations":
-        """Those (N,) that are chosen."""
+        """The chosen observations (N,)."""
         return Observations(self.wall[chosen], self.segment[chosen], self.span[chosen])
 
     def renamed(self, names: Ints) -> "Observations":
-        """With names[i] for wall i."""
+        """These observations, with names[i] for wall i."""
         return Observations(names[self.wall], self.segment, self.span)
 
     def lengths(self, walls: int) -> Array:

@@ -38,7 +38,7 @@ class Part:
 
     @property
     def length(self) -> float:
-        """In m."""
+        """Length in m."""
         return self.high - self.low
 
 
@@ -69,7 +69,7 @@ def _parts_of(pieces: Pieces, group: Group, grid: OccupancyGrid, settings: WallS
 
 
 def members_on(pieces: Pieces, group: Group | Part, low: float, high: float) -> Ints:
-    """Those of a group whose segments lie mostly between two coordinates, or cover most of what is there."""
+    """Members of a group whose segments lie mostly between two coordinates, or cover most of what is there."""
     t, _ = group.fit.coordinates(pieces.ends[group.members])
     first, last = t.min(axis=1), t.max(axis=1)
     shared = np.minimum(last, high) - np.maximum(first, low)

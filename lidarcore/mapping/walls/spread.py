@@ -16,7 +16,7 @@ Spread = Callable[[csr_array], Array]
 
 
 def common_spread(covariances: ArrayLike) -> Spread:
-    """Of covariances (K, 3, 3) of single poses: whatever moves one keyframe is taken to move all, each by its share.
+    """A spread from covariances (K, 3, 3) of single poses: what moves one keyframe moves all, each by its share.
 
     That is what drift does to keyframes that see the same wall. Raises CovarianceError.
     """
@@ -34,7 +34,7 @@ def common_spread(covariances: ArrayLike) -> Spread:
 
 
 def joint_spread(covariance: ArrayLike) -> Spread:
-    """Of the covariance (3 K, 3 K) of all poses: exact. Raises CovarianceError."""
+    """A spread from the covariance (3 K, 3 K) of all poses: exact. Raises CovarianceError."""
     C = np.asarray(covariance, np.float64)
     if C.ndim != 2 or C.shape[0] != C.shape[1] or C.shape[0] % 3 or not np.isfinite(C).all():
         raise CovarianceError(f"The covariance has shape {C.shape}: give (3 K, 3 K), all finite.")

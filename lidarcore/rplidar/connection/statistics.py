@@ -50,11 +50,11 @@ class Tally:
         self._recent.clear()
 
     def add(self, revolution: Revolution) -> None:
-        """One more has arrived."""
+        """Count a revolution that has arrived."""
         self._recent.append(revolution)
 
     def statistics(self, overruns: int) -> Statistics:
-        """As of now."""
+        """The statistics as of now."""
         total, recent = self._past + self._now, self._fresh()
         rate, samples = _rates(recent)
         return Statistics(

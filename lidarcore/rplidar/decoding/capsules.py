@@ -152,7 +152,7 @@ class CapsuleSequence:
         self._clock.arrived(self._samples(capsule.number), capsule.arrival)
 
     def _explained(self, late: float) -> bool:
-        """As late as before what is held: the turns missing there are all, and no reader is catching up."""
+        """Whether the delay is that before the held sweep: no more turns are missing, and no reader is catching up."""
         return len(self._held) > 0 and abs(late - self._held_late) < self._turn_time() / 2
 
     def _suspect(self, sweep: Sweep, unsure: bool, late: float, capsule: Capsule) -> None:

@@ -173,7 +173,7 @@ class NodeSequence:
             self.completed.append(revolution)
 
     def _sound(self, nodes: Nodes) -> Nodes:
-        """Those whose angle fits the spacing of the turn, if that is all there is to judge them by."""
+        """The nodes whose angle fits the spacing of the turn, if that is all there is to judge them by."""
         if self._format.samples > 1:
             return nodes
         wrong = misfits(self._turned(nodes[ANGLE])) & (
@@ -184,12 +184,12 @@ class NodeSequence:
 
 
 def _signed(angles: Ints) -> Ints:
-    """The same angles, from minus half a turn to half a turn."""
+    """Angles from minus half a turn to half a turn."""
     return (angles + TURN // 2) % TURN - TURN // 2
 
 
 def _joined(gaps: Ints, more: Ints) -> Ints:
-    """Both, in order; without what lies within one that is there."""
+    """Gaps of both, in order, without those that lie within one of the first."""
     new = [(begin, end) for begin, end in more if not ((gaps[:, 0] <= begin) & (end <= gaps[:, 1])).any()]
     joined = np.concatenate([gaps, np.array(new, np.int64).reshape(-1, 2)]).clip(0, TURN)
     return joined[np.argsort(joined[:, 0], kind="stable")]

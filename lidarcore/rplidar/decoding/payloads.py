@@ -14,7 +14,7 @@ Samples = tuple[Ints, Ints]
 """Distances (P, n) in 1/4 mm, 0: no return; lags in 1/65536 degree, (P, n) or one for all."""
 
 Decoder = Callable[[list[bytes], list[bytes | None]], Samples]
-"""From capsules, and for each the one that follows it, if that is known."""
+"""Decodes capsules, given for each the one that follows it, if that is known."""
 
 _HEADER = [("header", "V4")]  # sync and checksum, start angle
 _DENSE = np.dtype([*_HEADER, ("distances", "<u2", 40)])

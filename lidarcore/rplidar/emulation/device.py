@@ -154,7 +154,7 @@ class EmulatedS1(Device):
         return Descriptor(mode.answer_type, self.packet_size, repeated=True).encode()
 
     def _set_speed(self, rpm: int, now: float) -> None:
-        """Another speed; 0 stops the motor and with it the scan."""
+        """Set another speed; 0 stops the motor and with it the scan."""
         self._motor.coast(now)
         if rpm == 0:
             self._motor.wanted = 0.0

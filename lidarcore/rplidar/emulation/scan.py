@@ -35,7 +35,7 @@ class Motor:
 
     @property
     def is_stable(self) -> bool:
-        """As fast as wanted, nearly."""
+        """Whether the motor turns nearly as fast as it should."""
         return abs(self._speed - self.wanted) <= _STABLE * self.wanted + 1e-9
 
     def turn(self, n: int, period: float) -> tuple[Array, Array]:
