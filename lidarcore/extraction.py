@@ -11,7 +11,7 @@ from lidarcore.corners import find_corners
 from lidarcore.features import Features
 from lidarcore.lines import FITTER_IDS, FITTERS, WORK
 from lidarcore.noise import NoiseModel
-from lidarcore.polar import unit_vectors
+from lidarcore.polar import cos_sin
 from lidarcore.scan import Array, Ints, Scan
 from lidarcore.segmentation import compact, find_pieces, for_pieces, mean_increment, noise_seen
 from lidarcore.settings import ExtractionSettings
@@ -153,7 +153,7 @@ def _segment(
     indices: Ints,
 ) -> tuple[Ints, Ints, float]:
     """Beams to points, points to pieces: first and last point of each, and the noise seen in the ranges."""
-    unit_vectors(bearings, points[1], points[2])
+    cos_sin(bearings, points[1], points[2])
     n = compact(ranges, points, beams)
     seen = noise_seen(points[0, :n], scratch)
     noise = for_pieces(settings.noise, seen)

@@ -1,4 +1,4 @@
-"""Unit vectors of bearings, vectorised: a table would serve fixed beams only, libm costs more than the fits."""
+"""Cosines and sines of bearings, vectorised: a table would serve fixed beams only, libm costs more than the fits."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ _HALF_PI = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)
 
 
 @ordered_kernel
-def unit_vectors(bearings: Array, c: Array, s: Array) -> None:
+def cos_sin(bearings: Array, c: Array, s: Array) -> None:
     """Write cos and sin of the bearings (N,) rad, |bearing| < 1e5, to c and s; error below 1e-15.
 
     Taylor coefficients to degree 16/17: on [-pi/4, pi/4] the remainder is below 1e-17.

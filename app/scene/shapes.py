@@ -4,12 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore import Scan
-from lidarcore.geometry import ellipse_axes, ellipse_outline
+from lidarcore.geometry import ellipse_axes, ellipse_outline, unit_vectors
 
 Array = NDArray[np.float64]
 
-_TURN = np.linspace(0, 2 * np.pi, 33)
-CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], -1)  # (33, 2), closed
+CIRCLE = unit_vectors(np.linspace(0, 2 * np.pi, 33))  # (33, 2), closed
 DISC_VERTICES = np.vstack([np.zeros(3), np.column_stack([CIRCLE[:-1], np.zeros(32)])])
 DISC_FACES = np.array([(0, i, i % 32 + 1) for i in range(1, 33)])
 
@@ -27,7 +26,7 @@ def polylines(points: Array) -> Array:
 def wedge(start: float, end: float) -> Array:
     """Outline of the sector of the unit circle from one bearing counter-clockwise to the other, rad: (33, 2)."""
     arc = start + np.linspace(0, (end - start) % (2 * np.pi), len(CIRCLE) - 2)
-    return np.vstack([np.zeros(2), np.stack([np.cos(arc), np.sin(arc)], -1), np.zeros(2)])
+    return np.vstack([np.zeros(2), unit_vectors(arc), np.zeros(2)])
 
 
 def ellipses(xy: Array, covariance: Array, scale: float) -> tuple[Array, Array, Array]:

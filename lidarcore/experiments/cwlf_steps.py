@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lidarcore.geometry import unit_vectors
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array
 
@@ -93,8 +94,8 @@ def _polar_corner(j: _Polar, k: _Polar) -> Array:
 
 def _polar_corner_covariance(j: _Polar, k: _Polar, xy: Array, cj: Array, ck: Array) -> Array:
     """[38]: n . p = r gives n . dp = dr - (t . p) dalpha, from which the Jacobian [39b] follows."""
-    nj, nk = (np.array([np.cos(line.alpha), np.sin(line.alpha)]) for line in (j, k))
-    inverse = np.linalg.inv(np.stack([nj, nk]))
+    nj, nk = normals = unit_vectors([j.alpha, k.alpha])
+    inverse = np.linalg.inv(normals)
     Jj = np.outer(inverse[:, 0], [nj[1] * xy[0] - nj[0] * xy[1], 1])
     Jk = np.outer(inverse[:, 1], [nk[1] * xy[0] - nk[0] * xy[1], 1])
     covariance: Array = Jj @ cj @ Jj.T + Jk @ ck @ Jk.T

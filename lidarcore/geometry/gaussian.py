@@ -8,6 +8,7 @@ from scipy.special import chdtri
 
 from lidarcore.arrays import Array
 from lidarcore.errors import CovarianceError
+from lidarcore.geometry.se2 import unit_vectors
 
 
 def squared_mahalanobis(difference: Array, covariance: Array) -> Array:
@@ -56,7 +57,7 @@ def ellipse_outline(xy: Array, covariance: Array, sigmas: float, points: int) ->
     """Closed outlines (..., points, 2) of ellipses of covariances (..., 2, 2) around xy (..., 2)."""
     half, directions = ellipse_axes(covariance, sigmas)
     turn = np.linspace(0, 2 * np.pi, points)
-    circle = np.stack([np.cos(turn), np.sin(turn)], -1)
+    circle = unit_vectors(turn)
     outline: Array = xy[..., None, :] + circle @ np.swapaxes(directions * half[..., None, :], -1, -2)
     return outline
 

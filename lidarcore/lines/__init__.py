@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined, kernel
 from lidarcore.errors import DegenerateLineError, ScanError
 from lidarcore.lines import arras_siegwart, cwlf, ml, tls
 from lidarcore.lines.covariance import covariances
-from lidarcore.lines.line import Array, Line, Lines, normal_angle
+from lidarcore.lines.line import Line, Lines, normal_angle
 from lidarcore.lines.regression import (
     LINE_CONSISTENT,
     LINE_FIELDS,
@@ -27,7 +28,7 @@ from lidarcore.lines.regression import (
     store,
 )
 from lidarcore.noise import NoiseModel, SensorNoise
-from lidarcore.polar import unit_vectors
+from lidarcore.polar import cos_sin
 from lidarcore.scan import MAX_BEARING, as_row
 
 __all__ = [
@@ -143,7 +144,7 @@ def fit_beams(fitter: int, rho: Array, theta: Array, noise: NoiseModel, out: Arr
         if not (rho[i] > 0 and rho[i] < np.inf and np.abs(theta[i]) <= MAX_BEARING):
             return _BAD_BEAM
     rows = np.empty((2 + WORK, len(rho)))
-    unit_vectors(theta, rows[0], rows[1])
+    cos_sin(theta, rows[0], rows[1])
     return fit_piece(fitter, rho, rows[0], rows[1], noise, (rows[2], rows[3], rows[4]), out)
 
 

@@ -1,7 +1,7 @@
 """Total least squares in polar form, weighted [CWLF 3, 16-19]."""
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
-from lidarcore.lines.line import Array
 from lidarcore.lines.regression import (
     NO_LINE,
     OK,

@@ -6,8 +6,8 @@ the covariance s² exp(-|t_i - t_j| / L), and sums over all pairs of beams follo
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
-from lidarcore.lines.line import Array
 from lidarcore.lines.regression import Normal, Sym2, Work
 from lidarcore.noise import NoiseModel
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
-from lidarcore.lines.line import Array
 from lidarcore.lines.regression import NO_DIRECTION, NO_LINE, OK, Fit, moments
 
 

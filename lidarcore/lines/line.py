@@ -4,9 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from lidarcore.arrays import Array
+from lidarcore.geometry import unit_vectors
 
 
 def normal_angle(nx: ArrayLike, ny: ArrayLike) -> Array:
@@ -37,7 +38,7 @@ class Line:
     @property
     def normal(self) -> Array:
         """(2,) unit normal, pointing away from the sensor."""
-        return np.array([np.cos(self.alpha), np.sin(self.alpha)])
+        return unit_vectors(self.alpha)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -6,8 +6,8 @@ bearing carry no range noise, which is what biases regressions on (x, y).
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
-from lidarcore.lines.line import Array
 from lidarcore.lines.regression import (
     NO_LINE,
     NOT_CONVERGED,

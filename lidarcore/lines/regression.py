@@ -6,8 +6,8 @@ noise, and a weight for each point. Published formulas know the variances v_rho 
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
-from lidarcore.lines.line import Array
 
 # What a fit reports.
 OK, NO_DIRECTION, THROUGH_SENSOR, NOT_FINITE, NOT_CONVERGED = range(5)

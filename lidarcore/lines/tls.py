@@ -6,8 +6,8 @@ weights; wctls has the estimate of wtls and another covariance. None can express
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
-from lidarcore.lines.line import Array
 from lidarcore.lines.regression import (
     NO_LINE,
     OK,

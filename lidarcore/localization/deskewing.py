@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import wrap
+from lidarcore.geometry import rotation, wrap
 from lidarcore.localization.dead_reckoning import Velocity
 from lidarcore.localization.points import Points
 from lidarcore.scan import Array, Scan
@@ -54,9 +54,8 @@ def deskew(scan: Scan, v: float, w: float, u: float = 0.0) -> Scan:
 def skew(points: Points, times: Array, v: float, w: float, u: float) -> Points:
     """Points (K,) of a deskewed scan as the sensor saw them at times (K,) s after the stamp, from where it was then."""
     moved, turned = _arcs(times, v, w, u)
-    back = np.exp(-1j * turned)
-    seen = (points.xy @ [1, 1j] - moved) * back
-    R = np.stack([np.stack([back.real, -back.imag], -1), np.stack([back.imag, back.real], -1)], -2)
+    seen = (points.xy @ [1, 1j] - moved) * np.exp(-1j * turned)
+    R = rotation(-turned)
     return points.with_new(np.stack([seen.real, seen.imag], -1), R @ points.covariance @ R.transpose(0, 2, 1))
 
 

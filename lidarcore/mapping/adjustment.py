@@ -12,6 +12,7 @@ from scipy.sparse import coo_array, csr_array
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
+from lidarcore.geometry import rotate
 from lidarcore.mapping.cells import cells
 
 _GAP = 0.15  # m between two surfaces side by side
@@ -57,12 +58,7 @@ def normal_equations(
 
     The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
     """
-    c, s = np.cos(poses[seen.keyframes, 2]), np.sin(poses[seen.keyframes, 2])
-    turned = [
-        np.stack([c * v[:, 0] - s * v[:, 1], s * v[:, 0] + c * v[:, 1]], -1)
-        for v in (seen.means, seen.normals)
-    ]
-    arms, normals = turned
+    arms, normals = (rotate(poses[seen.keyframes, 2], v) for v in (seen.means, seen.normals))
     places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
     order, starts = _ordered(places, normals, size, seen.keyframes)
     K, G = len(poses), len(order)

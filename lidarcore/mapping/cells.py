@@ -7,6 +7,7 @@ errors. So surfaces are cut along themselves only, and parted across where there
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import rotate
 
 _SIDES = 8  # directions of normals that are kept apart
 
@@ -15,8 +16,7 @@ def cells(places: Array, normals: Array, size: float, gap: float) -> Ints:
     """Number (M,) of the cell of each patch: of about one direction, `size` m long, no gap of `gap` m across."""
     turn = 2 * np.pi / _SIDES
     side = np.floor(np.arctan2(normals[:, 1], normals[:, 0]) / turn + 0.5).astype(np.int64) % _SIDES
-    c, s = np.cos(turn * side), np.sin(turn * side)
-    across, along = c * places[:, 0] + s * places[:, 1], c * places[:, 1] - s * places[:, 0]
+    across, along = rotate(-turn * side, places).T
     strip = np.floor(along / size).astype(np.int64)
     order = np.lexsort([across, strip, side])
     new = (np.diff(side[order]) != 0) | (np.diff(strip[order]) != 0) | (np.diff(across[order]) > gap)

@@ -6,6 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
+from lidarcore.geometry import unit_vectors, wrap
 from lidarcore.mapping.settings import MatchSettings
 from lidarcore.scan import Scan
 
@@ -32,12 +33,12 @@ class Patches(NamedTuple):
 
 def patches(scan: Scan, settings: MatchSettings) -> Patches:
     """The patches of a scan; none where fewer than three neighbouring returns make a line."""
-    bearings = (scan.bearings[scan.valid] + np.pi) % (2 * np.pi) - np.pi
+    bearings = wrap(scan.bearings[scan.valid])
     order = np.argsort(bearings, kind="stable")
     bearings, ranges = bearings[order], scan.ranges[scan.valid][order]
     if len(bearings) < _LEAST:
         return Patches(np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0))
-    points = ranges[:, None] * np.stack([np.cos(bearings), np.sin(bearings)], -1)
+    points = ranges[:, None] * unit_vectors(bearings)
     spacing = float(np.median(np.diff(bearings)))
     reaches = np.clip(_BEAMS * spacing * ranges, settings.radius, 4 * settings.radius)
     noise = np.array([settings.noise.sigma_range, settings.noise.sigma_bearing]) ** 2

@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
-from lidarcore.geometry.kernels import wrap
+from lidarcore.geometry.kernels import rotate, wrap
 from lidarcore.mapping.patches import Patches
 from lidarcore.mapping.surfels import Surfels, nearest
 
@@ -81,11 +81,8 @@ def linearised(map: Surfels, scan: Patches, x: Array, reach: float, H: Array, B:
     c, s = np.cos(x[2]), np.sin(x[2])
     on, all_of_them = 0.0, 0.0
     for i in range(len(scan.means)):
-        dx, dy = c * scan.means[i, 0] - s * scan.means[i, 1], s * scan.means[i, 0] + c * scan.means[i, 1]
-        mx, my = (
-            c * scan.normals[i, 0] - s * scan.normals[i, 1],
-            s * scan.normals[i, 0] + c * scan.normals[i, 1],
-        )
+        dx, dy = rotate(c, s, scan.means[i, 0], scan.means[i, 1])
+        mx, my = rotate(c, s, scan.normals[i, 0], scan.normals[i, 1])
         all_of_them += scan.counts[i]
         k = nearest(map, x[0] + dx, x[1] + dy, mx, my, reach, _SIDE)
         if k < 0:

@@ -11,6 +11,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import MeasureError
 from lidarcore.features import Features
+from lidarcore.geometry import left_of, unit_vectors
 from lidarcore.mapping.measure import Feature, Measurement, angle_of, distance_of
 
 _Points = Callable[[Array], Array]  # of a feature, by the lines (L, 2) of all walls
@@ -70,11 +71,11 @@ def _points_of(features: Features, one: Feature) -> _Points:
     (wall,) = walls
     ends = np.stack([features.segments.start[wall], features.segments.end[wall]])
     alpha = features.lines.alpha[wall]
-    along = ends @ np.array([-np.sin(alpha), np.cos(alpha)])
+    along = ends @ left_of(unit_vectors(alpha))
 
     def points(lines: Array) -> Array:
-        c, s = _normals(lines[wall, 0])
-        placed: Array = lines[wall, 1] * np.array([c, s]) + along[:, None] * np.array([-s, c])
+        normal = unit_vectors(lines[wall, 0])
+        placed: Array = lines[wall, 1] * normal + along[:, None] * left_of(normal)
         return placed
 
     return points
@@ -82,10 +83,5 @@ def _points_of(features: Features, one: Feature) -> _Points:
 
 def _meeting(lines: Array) -> Array:
     """Where two lines (2, 2) meet: (1, 2) m."""
-    place = np.asarray(np.linalg.solve(_normals(lines[:, 0]), lines[:, 1]), np.float64)
+    place = np.asarray(np.linalg.solve(unit_vectors(lines[:, 0]), lines[:, 1]), np.float64)
     return place[None]
-
-
-def _normals(alpha: Array) -> Array:
-    normals: Array = np.stack([np.cos(alpha), np.sin(alpha)], -1)
-    return normals

@@ -6,13 +6,15 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
+from lidarcore.geometry import wrap
+from lidarcore.geometry.kernels import rotate
 from lidarcore.scan import Scan
 
 _APART = 0.1  # rad between beams from which on the sensor did not look between them
 
 
 class Sight(NamedTuple):
-    """The returns of a scan in the order of their bearings: bearings (N,) rad in [-pi, pi), ranges (N,) m."""
+    """The returns of a scan in the order of their bearings: bearings (N,) rad in (-pi, pi], ranges (N,) m."""
 
     bearings: Array
     ranges: Array
@@ -20,7 +22,7 @@ class Sight(NamedTuple):
 
 def sight(scan: Scan) -> Sight:
     """The returns of a scan."""
-    bearings = (scan.bearings[scan.valid] + np.pi) % (2 * np.pi) - np.pi
+    bearings = wrap(scan.bearings[scan.valid])
     order = np.argsort(bearings, kind="stable")
     return Sight(bearings[order], scan.ranges[scan.valid][order])
 
@@ -36,7 +38,8 @@ def agreement(reference: Sight, scan: Sight, pose: Array, margin: float) -> tupl
     N, last, seen, nearer = len(scan.bearings), len(reference.bearings) - 1, 0, 0
     for i in range(N):
         x, y = scan.ranges[i] * np.cos(scan.bearings[i]), scan.ranges[i] * np.sin(scan.bearings[i])
-        u, v = pose[0] + c * x - s * y, pose[1] + s * x + c * y
+        u, v = rotate(c, s, x, y)
+        u, v = pose[0] + u, pose[1] + v
         k = np.searchsorted(reference.bearings, np.arctan2(v, u))
         if k == 0 or k > last or reference.bearings[k] - reference.bearings[k - 1] > _APART:
             continue

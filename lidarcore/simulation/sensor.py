@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lidarcore.geometry import wrap
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Ints, Scan
 from lidarcore.simulation.world import World
@@ -29,8 +30,7 @@ class SimulatedSensor:
         true_bearings: Array = 2 * np.pi * turns - np.pi
         ranges, hit = self.world.cast(pose, true_bearings)
         ranges = ranges + np.sqrt(self.noise.range_variances(ranges)) * rng.normal(size=self.beams)
-        bearings = true_bearings + rng.normal(0, self.noise.sigma_bearing, self.beams)
-        bearings = (bearings + np.pi) % (2 * np.pi) - np.pi
+        bearings = wrap(true_bearings + rng.normal(0, self.noise.sigma_bearing, self.beams))
         ranges[ranges > self.max_range] = np.nan
         quality = np.where(np.isnan(ranges), 0.0, np.clip(60 - 4 * ranges, 5, 60))
         times = np.arange(self.beams) / (RATE * self.beams)

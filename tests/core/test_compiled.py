@@ -25,10 +25,10 @@ print(whole(3.0), sum(whole.stats.cache_hits.values()))
 """
 
 
-def run(folder: Path, source: str) -> tuple[float, int]:
+def run(folder: Path, source: str, name: str = "callee") -> tuple[float, int]:
     """What the caller gives with this callee in a process of its own, and whether its code was read from disk."""
-    (folder / "callee.py").write_text(source)
-    (folder / "caller.py").write_text(CALLER)
+    (folder / f"{name}.py").write_text(source)
+    (folder / "caller.py").write_text(CALLER.replace("callee", name))
     environment = os.environ | {"NUMBA_CACHE_DIR": str(folder / "kept"), "PYTHONDONTWRITEBYTECODE": "1"}
     made = subprocess.run(
         [sys.executable, "caller.py"], cwd=folder, env=environment, capture_output=True, text=True, check=True
@@ -44,6 +44,14 @@ def test_kept_code_is_used_until_a_kernel_that_it_calls_or_a_constant_changes(tm
     assert run(tmp_path, CALLEE.format("+ 1  # a remark", 10)) == (40.0, 1)
     assert run(tmp_path, CALLEE.format("* 2", 10)) == (60.0, 0)
     assert run(tmp_path, CALLEE.format("* 2", 100)) == (600.0, 0)
+
+
+@pytest.mark.long
+def test_kept_code_is_made_anew_where_a_module_that_it_used_has_another_name(tmp_path: Path) -> None:
+    assert run(tmp_path, CALLEE.format("+ 1", 10)) == (40.0, 0)
+    (tmp_path / "callee.py").unlink()
+    assert run(tmp_path, CALLEE.format("+ 1", 10), "renamed") == (40.0, 0)
+    assert run(tmp_path, CALLEE.format("+ 1", 10), "renamed") == (40.0, 1)
 
 
 def test_numbas_settings_are_left_alone() -> None:

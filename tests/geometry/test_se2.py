@@ -21,10 +21,13 @@ from lidarcore.geometry import (
     inverse,
     inverse_jacobian,
     kernels,
+    left_of,
     pose_difference,
     relative,
     relative_jacobians,
+    rotate,
     rotation,
+    unit_vectors,
     wrap,
 )
 from lidarcore.scan import Array
@@ -89,6 +92,16 @@ def test_composition_inverse_and_action_are_those_of_matrices(shape: tuple[int, 
     np.testing.assert_allclose(act(a, xy), (matrix(a) @ homogeneous)[..., :2, 0], atol=1e-12)
     seen = np.linalg.solve(matrix(a), homogeneous)[..., :2, 0]
     np.testing.assert_allclose(act_inverse(a, xy), seen, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_vectors_are_turned_by_their_matrix(shape: tuple[int, ...]) -> None:
+    heading, v = poses(shape, 1)[..., 2], points(shape, 2)
+    expected = (matrix(poses(shape, 1))[..., :2, :2] @ v[..., None])[..., 0]
+    np.testing.assert_allclose(rotate(heading, v), expected, atol=1e-12)
+    np.testing.assert_allclose(rotate(0.3, v), rotate(np.full(shape, 0.3), v), atol=1e-12)
+    np.testing.assert_allclose(left_of(v), rotate(np.pi / 2, v), atol=1e-12)
+    np.testing.assert_allclose(unit_vectors(heading), rotate(heading, np.array([1.0, 0.0])), atol=1e-15)
 
 
 @pytest.mark.parametrize("shape", SHAPES)

@@ -6,7 +6,7 @@ from lidarcore.arrays import Array, Ints
 from lidarcore.evaluation.consistency.trials import most_met
 from lidarcore.evaluation.intervals import LEVEL
 from lidarcore.features import Features
-from lidarcore.geometry import act_inverse, contains, wrap
+from lidarcore.geometry import act_inverse, contains, unit_vectors, wrap
 from lidarcore.simulation.world import World
 
 _LEAST_SINE = 0.1  # between two walls that truly meet; what lies between others is no corner
@@ -44,6 +44,5 @@ def _lines(walls: Array) -> Array:
 
 def _meeting(first: Array, second: Array) -> Array:
     """(K, 2) m, where lines (K, 2) meet."""
-    normals = np.stack([np.stack([np.cos(a[:, 0]), np.sin(a[:, 0])], -1) for a in (first, second)], 1)
-    met: Array = np.linalg.solve(normals, np.stack([first[:, 1], second[:, 1]], 1)[..., None])[..., 0]
-    return met
+    lines: Array = np.stack([first, second], 1)
+    return np.asarray(np.linalg.solve(unit_vectors(lines[..., 0]), lines[..., 1:])[..., 0], np.float64)

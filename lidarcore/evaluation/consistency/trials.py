@@ -10,13 +10,21 @@ from lidarcore.compiled import kernel
 from lidarcore.corners import intersect
 from lidarcore.evaluation.repeatability.places import Place
 from lidarcore.extraction import compiled_call
+from lidarcore.geometry.kernels import wrap
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, WORK, fit_piece
 from lidarcore.lines.regression import NOT_FINITE, OK
 from lidarcore.noise import NoiseModel
-from lidarcore.polar import unit_vectors
+from lidarcore.polar import cos_sin
 from lidarcore.scan import Array, Ints
 from lidarcore.settings import ExtractionSettings
-from lidarcore.tables import CORNER_FIELDS, FIRST_BEAM, LAST_BEAM, SEGMENTS
+from lidarcore.tables import (
+    CORNER_CONSISTENT,
+    CORNER_FIELDS,
+    CORNER_PUBLISHED,
+    FIRST_BEAM,
+    LAST_BEAM,
+    SEGMENTS,
+)
 
 Segmentation = Literal["known", "found"]
 SEGMENTATIONS: tuple[Segmentation, ...] = ("known", "found")
@@ -65,7 +73,7 @@ def simulate(
             table[:, :, f, :2], table[:, :, f, at : at + 4].reshape(*table.shape[:2], 2, 2), bounds, corners
         )
         for name, f in FITTER_IDS.items()
-        for kind, at in (("published", 2), ("consistent", 6))
+        for kind, at in (("published", CORNER_PUBLISHED), ("consistent", CORNER_CONSISTENT))
     }
 
 
@@ -106,7 +114,7 @@ def _fit_known(
     c, s, work = np.empty(n), np.empty(n), np.empty((WORK, n))
     for k in range(len(errors)):
         rho = ranges + errors[k, 0]
-        unit_vectors(bearings + errors[k, 1], c, s)
+        cos_sin(bearings + errors[k, 1], c, s)
         for p in range(len(first)):
             for side in range(2):
                 a, b = first[p, side], first[p, side] + count[p, side]
@@ -140,17 +148,14 @@ def measure(
     bearings: Array,
     hit: Ints,
 ) -> None:
-    """Add errors (2, N) of range and bearing and sort the beams by bearing in [-pi, pi), as a sensor reports them.
+    """Add errors (2, N) of range and bearing and sort the beams by bearing in (-pi, pi], as a sensor reports them.
 
     By insertion: noise swaps neighbours, and few beams pass the seam.
     """
     n, seam = len(true_ranges), np.argmin(true_bearings)
     for i in range(n):
         k = (seam + i) % n
-        rho, theta = (
-            true_ranges[k] + errors[0, k],
-            (true_bearings[k] + errors[1, k] + np.pi) % (2 * np.pi) - np.pi,
-        )
+        rho, theta = true_ranges[k] + errors[0, k], wrap(true_bearings[k] + errors[1, k])
         at = i
         while at > 0 and bearings[at - 1] > theta:
             ranges[at], bearings[at], hit[at] = ranges[at - 1], bearings[at - 1], hit[at - 1]

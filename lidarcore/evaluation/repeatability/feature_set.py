@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.features import Features
-from lidarcore.geometry import act
+from lidarcore.geometry import act, left_of, unit_vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,9 +56,7 @@ class FeatureSet:
 
     def _unit_systematic(self) -> Array:
         """(M, 2, 2) of alpha and r, for a sigma of 1 m."""
-        alpha = self.lines[:, 0]
-        tangent = np.column_stack([-np.sin(alpha), np.cos(alpha)])
-        along = (self.ends * tangent[:, None]).sum(-1)
+        along = (self.ends * left_of(unit_vectors(self.lines[:, 0]))[:, None]).sum(-1)
         middle, half = along.mean(1), np.maximum(np.ptp(along, axis=1) / 2, 1e-3)
         a_a = 1 / half**2
         a_r = middle * a_a
@@ -68,9 +66,8 @@ class FeatureSet:
 
     def _of_corners(self, added: Array) -> Array:
         """(K, 2, 2) m² that covariances (M, 2, 2) of the lines make of corners: n . x = r for both lines."""
-        alpha = self.lines[self.walls, 0]  # (K, 2)
-        normals = np.stack([np.cos(alpha), np.sin(alpha)], -1)
-        along = (np.stack([-np.sin(alpha), np.cos(alpha)], -1) * self.corners[:, None]).sum(-1)
+        normals = unit_vectors(self.lines[self.walls, 0])  # (K, 2, 2)
+        along = (left_of(normals) * self.corners[:, None]).sum(-1)
         slope = np.stack([-along, np.ones_like(along)], -1)  # of n . x - r, by alpha and r, negative
         across = np.einsum("kwi,kwij,kwj->kw", slope, added[self.walls], slope)
         inverse = np.linalg.inv(normals)
@@ -81,10 +78,8 @@ class FeatureSet:
 def moved(lines: Array, pose: Array) -> tuple[Array, Array, Array]:
     """Lines (M, 2) of frame b in frame a, T_a_b (3,); Jacobians (M, 2, 3) by the pose and (M, 2, 2) by the lines."""
     alpha = lines[:, 0] + pose[2]
-    normal, tangent = (
-        np.column_stack(pair) for pair in ((np.cos(alpha), np.sin(alpha)), (-np.sin(alpha), np.cos(alpha)))
-    )
-    turned = tangent @ pose[:2]
+    normal = unit_vectors(alpha)
+    turned = left_of(normal) @ pose[:2]
     by_pose, by_line = np.zeros((len(lines), 2, 3)), np.zeros((len(lines), 2, 2))
     by_pose[:, 0, 2] = 1
     by_pose[:, 1, :2], by_pose[:, 1, 2] = normal, turned

@@ -17,6 +17,7 @@ from lidarcore.evaluation.repeatability.summary import CornerMethod, Summary, Wa
 from lidarcore.evaluation.repeatability.wall_tracker import WallRow, WallTracker, told_near
 from lidarcore.evaluation.repeatability.window import FeatureWindow
 from lidarcore.features import Features
+from lidarcore.geometry import unit_vectors
 from lidarcore.lines import FITTERS
 from lidarcore.tracking import CornerRow, Tracker
 
@@ -159,5 +160,5 @@ def _walls_seen(found: Features) -> Array:
 
 def _feet(lines: Array) -> Array:
     """(R, 2) m, the points of lines (alpha, r) next to the sensor."""
-    feet: Array = lines[:, 1:] * np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
+    feet: Array = lines[:, 1:] * unit_vectors(lines[:, 0])
     return feet

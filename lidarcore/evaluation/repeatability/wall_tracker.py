@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.features import Features
+from lidarcore.geometry import wrap
 
 SHARED = 0.5  # of the shorter one, at least, lies side by side with the other
 _TILT = 0.1  # rad between a wall and what may be it again, if there were no noise
@@ -115,7 +116,7 @@ class WallTracker:
 def unwrapped(lines: Array, near: Array) -> tuple[Array, Array]:
     """Alpha (rad) and r (m) of lines (..., 2) with the alpha next to `near`; r < 0 where it is turned for that."""
     alpha, r = lines[..., 0], lines[..., 1]
-    off = (alpha - near + np.pi) % (2 * np.pi) - np.pi
+    off = wrap(alpha - near)
     turned = np.abs(off) > np.pi / 2
     return near + off - np.where(turned, np.copysign(np.pi, off), 0.0), np.where(turned, -r, r)
 

@@ -2,11 +2,9 @@
 
 from typing import BinaryIO
 
-import numpy as np
 from PIL import Image, ImageDraw
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import inverse
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.grid.ros_map import shades_of
 from lidarcore.mapping.walls import Walls
@@ -32,8 +30,4 @@ def map_png(grid: OccupancyGrid, walls: Walls, path: Array, file: BinaryIO) -> N
 
 
 def _pixels(grid: OccupancyGrid, xy: Array, zoom: int) -> list[tuple[float, float]]:
-    T = inverse(grid.origin)
-    c, s = np.cos(T[2]), np.sin(T[2])
-    column = (c * xy[:, 0] - s * xy[:, 1] + T[0]) / grid.resolution
-    row = len(grid.cells) - (s * xy[:, 0] + c * xy[:, 1] + T[1]) / grid.resolution
-    return [(x * zoom, y * zoom) for x, y in zip(column.tolist(), row.tolist(), strict=True)]
+    return [(x * zoom, (len(grid.cells) - y) * zoom) for x, y in grid.in_cells(xy).tolist()]

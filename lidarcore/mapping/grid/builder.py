@@ -6,6 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import GridError
+from lidarcore.geometry import unit_vectors
 from lidarcore.mapping.grid.occupancy import FREE, OCCUPIED, UNKNOWN, OccupancyGrid
 from lidarcore.mapping.grid.rays import Evidence, mark_scan
 from lidarcore.mapping.grid.settings import GridSettings
@@ -40,10 +41,7 @@ class GridBuilder:
         known = scan.valid & (scan.ranges <= self.settings.max_range)
         ranges, angles = scan.ranges[known], scan.bearings[known] + pose[2]
         start = np.asarray(pose[:2], np.float64) / self.settings.resolution
-        ends = (
-            start
-            + np.stack([np.cos(angles), np.sin(angles)], -1) * (ranges / self.settings.resolution)[:, None]
-        )
+        ends = start + unit_vectors(angles) * (ranges / self.settings.resolution)[:, None]
         self._make_room(np.vstack([ends, start]))
         self._next_mark()
         ends, start = ends - self._low, start - self._low

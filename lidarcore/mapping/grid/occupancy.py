@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import GridError
-from lidarcore.geometry import inverse
+from lidarcore.geometry import act, act_inverse
 
 Cells = NDArray[np.int8]
 Mask = NDArray[np.bool_]
@@ -65,13 +65,14 @@ class OccupancyGrid:
         """(H, W) true where nothing stands."""
         return (self.cells >= 0) & (self.cells <= FREE_UP_TO)
 
+    def in_cells(self, xy: Array) -> Array:
+        """Columns and rows (N, 2), with fractions, of points (N, 2) m in the world, from the grid's first corner."""
+        placed: Array = act_inverse(self.origin, xy) / self.resolution
+        return placed
+
     def cells_of(self, xy: Array) -> Ints:
         """Row and column (N, 2) of points (N, 2) m in the world, which may lie outside of the grid."""
-        T = inverse(self.origin)
-        c, s = np.cos(T[2]), np.sin(T[2])
-        column = (c * xy[:, 0] - s * xy[:, 1] + T[0]) / self.resolution
-        row = (s * xy[:, 0] + c * xy[:, 1] + T[1]) / self.resolution
-        cells: Ints = np.floor(np.stack([row, column], -1)).astype(np.int64)
+        cells: Ints = np.floor(self.in_cells(xy)[:, ::-1]).astype(np.int64)
         return cells
 
     def at(self, xy: Array) -> Cells:
@@ -85,6 +86,5 @@ class OccupancyGrid:
     def centres(self, mask: Mask) -> Array:
         """Centres (N, 2) m in the world of the cells where a mask (H, W) is true."""
         row, column = np.nonzero(mask)
-        x, y = (column + 0.5) * self.resolution, (row + 0.5) * self.resolution
-        c, s = np.cos(self.origin[2]), np.sin(self.origin[2])
-        return np.stack([self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y], -1)
+        centres = np.asarray((np.stack([column, row], -1) + 0.5) * self.resolution, np.float64)
+        return act(self.origin, centres)

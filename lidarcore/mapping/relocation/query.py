@@ -7,7 +7,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import compose, inverse
+from lidarcore.geometry import act, relative
 from lidarcore.mapping.relocation.settings import RelocationSettings
 from lidarcore.scan import Scan
 
@@ -34,11 +34,9 @@ def query_of(
         raise LocalizationError(f"{len(scans)} scans and poses of shape {poses.shape}: give a pose for each.")
     points, origins = [], []
     for scan, pose in zip(scans, poses, strict=True):
-        x, y, heading = compose(inverse(poses[-1]), pose)
-        c, s = np.cos(heading), np.sin(heading)
-        seen = scan.xy[scan.valid & (scan.ranges <= settings.max_range)] @ np.array([[c, s], [-s, c]])
-        points.append(seen + np.array([x, y]))
-        origins.append(np.broadcast_to([x, y], seen.shape))
+        T_last_scan = relative(poses[-1], pose)
+        points.append(act(T_last_scan, scan.xy[scan.valid & (scan.ranges <= settings.max_range)]))
+        origins.append(np.broadcast_to(T_last_scan[:2], points[-1].shape))
     return Query(*_thinned(np.concatenate(points), np.concatenate(origins), settings))
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import wrap
+from lidarcore.geometry import rotate, wrap
 from lidarcore.mapping.relocation.field import FULL, Field
 
 _ROUNDS = 10
@@ -40,8 +40,7 @@ def refined(field: Field, points: Array, pose: Array) -> tuple[Array, Array]:
 
 def _linearised(level: Array, dx: Array, dy: Array, points: Array, pose: Array) -> tuple[Array, Array]:
     """Fits (N,) of points at a pose and their Jacobian (N, 3)."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    x, y = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
+    x, y = rotate(pose[2], points).T
     at = np.stack([y + pose[1] - 0.5, x + pose[0] - 0.5])
     fit, gx, gy = (map_coordinates(table, at, order=1) for table in (level, dx, dy))
     return fit, np.stack([gx, gy, -y * gx + x * gy], -1)

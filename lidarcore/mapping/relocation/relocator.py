@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import UncertainPose, compose, inverse, largest_variance, wrap
+from lidarcore.geometry import UncertainPose, act, compose, largest_variance, relative, rotate, rotation, wrap
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
 from lidarcore.mapping.relocation.query import Query
@@ -174,29 +174,26 @@ class Relocator:
         return np.array([place[1] + 0.5, place[2] + 0.5, angles[place[0]]])
 
     def _against(self, query: Query, pose: Array) -> float:
-        c, s = np.cos(pose[2]), np.sin(pose[2])
-        turn = np.array([[c, s], [-s, c]]) / self._grid.resolution
-        points, origins = query.points @ turn + pose[:2], query.origins @ turn + pose[:2]
+        points, origins = (act(pose, xy / self._grid.resolution) for xy in (query.points, query.origins))
         return float(contradicted(self._field.states, points, origins))
 
     def _in_field(self, pose: Array) -> Array:
         """A pose (3,) in the world in cells of the field."""
-        x, y, heading = compose(inverse(self._grid.origin), pose)
+        x, y, heading = relative(self._grid.origin, pose)
         return np.array([*(np.array([x, y]) / self._grid.resolution - self._field.corner), heading])
 
     def _in_world(self, pose: Array, covariance: Array) -> tuple[Array, Array]:
         """A pose in cells of the field and its covariance, in metres of the world."""
         cell = self._grid.resolution
         in_grid = np.array([*((pose[:2] + self._field.corner) * cell), pose[2]])
-        c, s = np.cos(self._grid.origin[2]), np.sin(self._grid.origin[2])
-        J = np.array([[c * cell, -s * cell, 0], [s * cell, c * cell, 0], [0, 0, 1]])
+        J = np.eye(3)
+        J[:2, :2] = cell * rotation(self._grid.origin[2])
         return compose(self._grid.origin, in_grid), J @ covariance @ J.T
 
 
 def _turned(points: Array, angles: Array) -> tuple["np.ndarray", "np.ndarray"]:
     """Columns and rows (A, N) of points at headings, from the middle of the sensor's cell."""
-    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
-    x, y = c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]
+    x, y = np.moveaxis(rotate(angles[:, None], points), -1, 0)
     return np.floor(x + 0.5).astype(np.int32), np.floor(y + 0.5).astype(np.int32)
 
 

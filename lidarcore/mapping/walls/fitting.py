@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import wrap
+from lidarcore.geometry import left_of, unit_vectors, wrap
 from lidarcore.mapping.walls.pieces import Pieces
 
 _SCATTER = 0.01
@@ -36,12 +36,12 @@ class Fit:
     @property
     def normal(self) -> Array:
         """(2,) unit vector across the line, away from who sees it."""
-        return np.array([np.cos(self.alpha), np.sin(self.alpha)])
+        return unit_vectors(self.alpha)
 
     @property
     def along(self) -> Array:
         """(2,) unit vector along the line, to the left of the normal."""
-        return np.array([-np.sin(self.alpha), np.cos(self.alpha)])
+        return left_of(self.normal)
 
     def coordinates(self, xy: Array) -> tuple[Array, Array]:
         """Along the line from its centre, and beside it along the normal, of points (..., 2): both (...,) m."""
@@ -63,15 +63,15 @@ def fit_line(pieces: Pieces, members: Ints) -> Fit:
     spread = np.linalg.inv(weights.sum(axis=0))
     gains = spread @ weights
     turn, shift = (gains @ np.stack([angle, offset], -1)[..., None]).sum(axis=0)[:, 0]
-    normal = np.array([np.cos(alpha), np.sin(alpha)])
     total = (gains @ noise @ gains.swapaxes(1, 2)).sum(axis=0)
-    return Fit(centre + shift * normal, float(wrap(alpha + turn)), total, gains @ from_pose, gains[:, 1, 1])
+    moved = centre + shift * unit_vectors(alpha)
+    return Fit(moved, float(wrap(alpha + turn)), total, gains @ from_pose, gains[:, 1, 1])
 
 
 def _scatter(ends: Array, centre: Array, alpha: float) -> Array:
     """Covariances (N, 2, 2) of angle and offset at a centre, of segments shifted and turned by the scatter."""
     length = np.maximum(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=-1), 1e-3)
-    lever = (ends.mean(axis=1) - centre) @ [-np.sin(alpha), np.cos(alpha)]
+    lever = (ends.mean(axis=1) - centre) @ left_of(unit_vectors(alpha))
     turn, shift = 12 * (_SCATTER / length) ** 2, np.full(len(ends), _SCATTER**2)
     mixed = lever * turn
     return np.stack([np.stack([turn, mixed], -1), np.stack([mixed, shift + lever * mixed], -1)], -2)
@@ -85,11 +85,10 @@ def _measurements(
     By the segment's line (N, 2, 2) and by its keyframe's pose (N, 2, 3), x, y and heading.
     """
     own = pieces.alpha[members]
-    normal = np.stack([np.cos(own), np.sin(own)], -1)
-    along = np.stack([-normal[:, 1], normal[:, 0]], -1)
+    normal = unit_vectors(own)
     angle = wrap(own - alpha)
     offset = ((pieces.ends[members].mean(axis=1) - centre) * normal).sum(axis=-1)
-    lever = ((pieces.position[members] - centre) * along).sum(axis=-1)
+    lever = ((pieces.position[members] - centre) * left_of(normal)).sum(axis=-1)
     one, zero = np.ones(len(members)), np.zeros(len(members))
     from_line = np.stack([np.stack([one, zero], -1), np.stack([lever, one], -1)], 1)
     from_pose = np.stack([np.stack([zero, zero, one], -1), np.stack([*normal.T, lever], -1)], 1)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.arrays import Ints
+from lidarcore.geometry import wrap
 from lidarcore.mapping.walls.fitting import Fit, fit_line
 from lidarcore.mapping.walls.pieces import Pieces
 from lidarcore.mapping.walls.settings import WallSettings
@@ -49,7 +50,7 @@ def _grown(pieces: Pieces, seed: int, candidates: Ints, settings: WallSettings) 
 def _along(pieces: Pieces, fit: Fit, seed: int, candidates: Ints, settings: WallSettings) -> Ints:
     """The candidates along a line that follow on each other from the seed on, the seed among them."""
     t, distance = fit.coordinates(pieces.ends[candidates])
-    turned = np.abs((pieces.alpha[candidates] - fit.alpha + np.pi) % (2 * np.pi) - np.pi)
+    turned = np.abs(wrap(pieces.alpha[candidates] - fit.alpha))
     near = (np.abs(distance).max(axis=1) <= settings.distance) & (turned < _ALIKE) | (candidates == seed)
     close, low, high = candidates[near], t[near].min(axis=1), t[near].max(axis=1)
     order = np.argsort(low, kind="stable")

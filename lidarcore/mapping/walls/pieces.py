@@ -8,6 +8,7 @@ import numpy as np
 from lidarcore.arrays import Array, Ints
 from lidarcore.extraction import extract
 from lidarcore.features import Features
+from lidarcore.geometry import act, unit_vectors, wrap
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
@@ -56,9 +57,7 @@ def collect_pieces(scans: Sequence[Scan], poses: Array, settings: ExtractionSett
     noise = np.hypot(
         settings.noise.sigma_range, settings.noise.sigma_bearing * np.hypot(*ends.mean(axis=1).T)
     )
-    c, s = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    turn = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], -2)[:, None]
-    ends, beyond = ((turn @ xy[..., None])[..., 0] + pose[:, None, :2] for xy in (ends, beyond))
+    ends, beyond = (act(pose[:, None], xy) for xy in (ends, beyond))
     return Pieces(
         keyframe, alpha + pose[:, 2], ends, beyond, covariance, noise, pose[:, :2], points.astype(np.int64)
     )
@@ -78,15 +77,14 @@ def _beyond(features: Features) -> Array:
     beams = np.stack([segments.first_beam, segments.last_beam], 1)
     neighbours = (beams + np.array([-1, 1])) % len(scan)
     bearing = scan.bearings[neighbours]
-    step = np.abs((bearing - scan.bearings[beams] + np.pi) % (2 * np.pi) - np.pi)
+    step = np.abs(wrap(bearing - scan.bearings[beams]))
     across = np.cos(bearing - lines.alpha[:, None])
     with np.errstate(divide="ignore", invalid="ignore"):
         crossing = lines.r[:, None] / across
         past = (
             (across > 0.1) & (scan.ranges[neighbours] > crossing + _BEHIND) & (step < _NEXT * _median(step))
         )
-    direction = np.stack([np.cos(bearing), np.sin(bearing)], -1)
-    beyond: Array = np.where(past, crossing, np.nan)[..., None] * direction
+    beyond: Array = np.where(past, crossing, np.nan)[..., None] * unit_vectors(bearing)
     return beyond
 
 
