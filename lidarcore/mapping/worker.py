@@ -13,6 +13,9 @@ Item = TypeVar("Item")
 class Worker(Generic[Item]):
     """Calls job(item, waiting) for each item in turn, `waiting` being the number of those behind it.
 
+    Nothing is dropped: items are keyframes, each of which the map, or the path in a known map, keeps. What waits is
+    thus never more than will be kept.
+
     idle  s without an item after which job(None, 0) is called; never if None
     """
 

@@ -24,7 +24,8 @@ def place_ends(
 ) -> None:  # fmt: skip
     """Move each common end of two neighbours in one run to where their lines meet, or to the likeliest step.
 
-    first, last (count,) are changed in place; so are the moments m (count, MOMENTS).
+    first, last (count,) are changed in place. The moments m (count, MOMENTS) are scratch, and afterwards not those of
+    the pieces: the ends move once more after they were summed up.
     increment is the angle between beams, rad.
     """
     reach = max(_REACH, int(_REACH_ANGLE / increment))

@@ -32,29 +32,6 @@ SEGMENT = {
     "covariance": [[2.1e-06, -1.0e-07], [-1.0e-07, 2.9e-06]],
 }
 CORNER = {"id": 12, "segments": [0, 1], "selected": True, "by_method": {"ml": MEASURED}}
-DEVICE = {
-    "port": "/dev/ttyUSB0",
-    "name": "RPLIDAR S1",
-    "serial": "A1B2C3D4E5F60718293A4B5C6D7E8F90",
-    "firmware": "1.28",
-    "hardware": 18,
-    "health": "good",
-    "mode": "DenseBoost",
-    "modes": ["Standard", "DenseBoost"],
-    "rpm": 600,
-    "baud": 256000,
-    "state": "streaming",
-    "error": None,
-    "rate_hz": 10.0,
-    "samples_per_s": 9259.0,
-    "completeness": 0.998,
-    "bytes": 1203440,
-    "revolutions": 618,
-    "reconnects": 0,
-    "overruns": 0,
-    "checked": True,
-    "dropped": {"checksum": 2},
-}
 DEVICE_FOUND = {
     "path": "/dev/ttyUSB0",
     "description": "CP2102 USB to UART Bridge Controller",

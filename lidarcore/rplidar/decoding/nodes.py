@@ -28,7 +28,7 @@ CHUNK = 1024  # nodes looked at together, at most
 FEW = 64  # nodes that wait for more, unless one of them starts a turn
 LATE = 0.05  # s; after a gap, a node this late may be turns further than its angle says
 
-ANGLE, DISTANCE, QUALITY, START, INDEX, AFTER_LOSS = range(6)
+ANGLE, DISTANCE, _, START, INDEX, AFTER_LOSS = range(6)
 Nodes = NDArray[np.int64]
 """(6, N), rows: 1/65536 degree, 1/4 mm, quality, starts a revolution, number in the stream, bytes were lost before."""
 
