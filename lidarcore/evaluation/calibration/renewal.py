@@ -7,6 +7,7 @@ import numpy as np
 from lidarcore.evaluation.repeatability.wall_tracker import WallTracker, told_near
 from lidarcore.extraction import extract
 from lidarcore.features import Features
+from lidarcore.geometry import contains
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings
@@ -18,7 +19,6 @@ _SETTLING = (
     10  # scans after a start, of real sensors: walls lie four times as far off as later, and then no more
 )
 
-_CHI2_95 = 5.991464547
 _STEPS = np.linspace(0.0, 1.0, 21)
 
 
@@ -47,8 +47,7 @@ def _needed(repeated: Array, anew: Array) -> float:
     errors = (repeated[:, :2] - repeated[:, :2].mean(0)) / np.sqrt(1 - 1 / len(repeated))
     c0, c1 = (rows[:, 2:].reshape(-1, 2, 2) for rows in (repeated, anew))
     for share in _STEPS.tolist():
-        solved = np.linalg.solve(c0 + share * (c1 - c0), errors[..., None])[..., 0]
-        if np.mean((errors * solved).sum(1) <= _CHI2_95) >= _HELD:
+        if contains(errors, c0 + share * (c1 - c0), _HELD).mean() >= _HELD:
             return float(share)
     return 1.0
 
