@@ -11,7 +11,7 @@ from lidarcore.geometry import UncertainPose, compose, pose_difference
 from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, write_ros_map
 from lidarcore.mapping.relocation import Relocator, query_of
 from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
-from lidarcore.mapping.relocation.search import best_pose, contradicted, fit_at, squares
+from lidarcore.mapping.relocation.search import Turned, best_pose, contradicted, fit_at, squares
 from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
 from lidarcore.simulation.rooms import rectangular_room
 
@@ -38,22 +38,18 @@ def test_branch_and_bound_finds_what_brute_force_finds():
     for _ in range(5):
         cells = rng.choice([-1, 0, 100], (60, 75), p=[0.3, 0.62, 0.08]).astype(np.int8)
         field = make_field(OccupancyGrid(cells, 0.05, np.zeros(3)), 0.1)
-        columns = rng.integers(-25, 25, (7, 30)).astype(np.int32)
-        rows = rng.integers(-25, 25, (7, 30)).astype(np.int32)
+        points = Turned(*rng.integers(-25, 25, (2, 7, 30)).astype(np.int32))
         fits = {
-            (a, x, y): fit_at(field.levels[0], columns[a], rows[a], x, y, 0)
+            (a, x, y): fit_at(field.levels[0], points.columns[a], points.rows[a], x, y, 0)
             for a in range(7)
             for y, x in np.argwhere(field.room[0] > 0).tolist()
         }
         best = max(fits.values())
         height, width = field.room.shape[1:]
         everywhere = (LEVELS - 1, np.arange(7), (0, 0, width, height))
-        nodes, bounds = squares(field.levels, field.room, columns, rows, *everywhere, 0)
-        order = np.argsort(-bounds, kind="stable")
+        nodes = squares(field, points, *everywhere, 0)
         none = np.empty((0, 3), np.int32)
-        fit, *place = best_pose(
-            field.levels, field.room, columns, rows, nodes, bounds, order, 1, none, (0, 0)
-        )
+        fit, *place = best_pose(field, points, nodes, 1, none, (0, 0))
         assert fit == best == fits[tuple(place)]
         # And the best of the rest, if all within eight cells at angles next to it do not count.
         taken, apart = np.array([place], np.int32), (1, 8)
@@ -62,14 +58,8 @@ def test_branch_and_bound_finds_what_brute_force_finds():
             for (a, x, y), value in fits.items()
             if min((a - place[0]) % 7, (place[0] - a) % 7) > 1 or np.hypot(x - place[1], y - place[2]) > 8
         )
-        assert (
-            best_pose(field.levels, field.room, columns, rows, nodes, bounds, order, 1, taken, apart)[0]
-            == rest
-        )
-        nothing = best_pose(
-            field.levels, field.room, columns, rows, nodes, bounds, order, best + 1, none, (0, 0)
-        )
-        assert nothing[0] == -1
+        assert best_pose(field, points, nodes, 1, taken, apart)[0] == rest
+        assert best_pose(field, points, nodes, best + 1, none, (0, 0))[0] == -1
 
 
 def test_the_fit_of_a_point_falls_with_its_distance_from_what_stands():

@@ -1,12 +1,12 @@
 """How well a point fits a map, for every cell, and the best of squares of cells: the bounds of a search."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Ints
 from lidarcore.errors import LocalizationError
 from lidarcore.mapping.grid import OccupancyGrid
 
@@ -22,8 +22,7 @@ _MOST_CELLS = 20_000_000
 _MARGIN = 1 << (LEVELS - 1)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Field:
+class Field(NamedTuple):
     """An H x W part of a grid with a margin, ready to be searched for a pose:
 
     levels  (LEVELS, H, W) best fit of the square of 2^level cells that begins at a cell
@@ -35,7 +34,7 @@ class Field:
     levels: Bytes
     room: Bytes
     states: Bytes
-    corner: Array
+    corner: Ints
 
 
 def make_field(grid: OccupancyGrid, reach: float) -> Field:

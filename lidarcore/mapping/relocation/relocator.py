@@ -11,7 +11,7 @@ from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
 from lidarcore.mapping.relocation.query import Query
 from lidarcore.mapping.relocation.refine import refined
-from lidarcore.mapping.relocation.search import best_pose, contradicted, fit_at, squares
+from lidarcore.mapping.relocation.search import Turned, best_pose, contradicted, fit_at, squares
 from lidarcore.mapping.relocation.settings import RelocationSettings
 
 Verdict = Literal["found", "too few points", "no fit", "several places"]
@@ -111,20 +111,15 @@ class Relocator:
     ) -> Relocation | None:
         """The best pose at some of the angles in a box of cells, if the points fit at one."""
         s, field = self.settings, self._field
-        columns, rows = _turned(query.points / self._grid.resolution, angles)
+        points = _turned(query.points / self._grid.resolution, angles)
         full = FULL * len(query.points)
         threshold = int(s.fit * full)
-        nodes, bounds = squares(
-            field.levels, field.room, columns, rows, level, tried, box, int(s.rival * threshold)
-        )
-        order = np.argsort(-bounds, kind="stable")
+        nodes = squares(field, points, level, tried, box, int(s.rival * threshold))
         apart = int(_APART[1] / (angles[1] - angles[0])), int(_APART[0] / self._grid.resolution)
         taken = np.empty((0, 3), np.int32)
         places: list[_Place] = []
         for _ in range(_MOST_PLACES):
-            fit, *place = best_pose(
-                field.levels, field.room, columns, rows, nodes, bounds, order, threshold, taken, apart
-            )
+            fit, *place = best_pose(field, points, nodes, threshold, taken, apart)
             if fit < 0:
                 break
             pose = self._pose(angles, place)
@@ -191,10 +186,10 @@ class Relocator:
         return compose(self._grid.origin, in_grid), J @ covariance @ J.T
 
 
-def _turned(points: Array, angles: Array) -> tuple["np.ndarray", "np.ndarray"]:
-    """Columns and rows (A, N) of points at headings, from the middle of the sensor's cell."""
+def _turned(points: Array, angles: Array) -> Turned:
+    """The points at headings, from the middle of the sensor's cell."""
     x, y = np.moveaxis(rotate(angles[:, None], points), -1, 0)
-    return np.floor(x + 0.5).astype(np.int32), np.floor(y + 0.5).astype(np.int32)
+    return Turned(np.floor(x + 0.5).astype(np.int32), np.floor(y + 0.5).astype(np.int32))
 
 
 def _nowhere(verdict: Verdict) -> Relocation:

@@ -1,46 +1,55 @@
 """Branch and bound over all poses in a map [Hess et al. 2016; Olson 2009]: the best there is, not the best of some."""
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.compiled import kernel
-from lidarcore.mapping.relocation.field import FULL, LEVELS, OCCUPIED, OPEN
+from lidarcore.compiled import inlined, kernel
+from lidarcore.mapping.relocation.field import FULL, LEVELS, OCCUPIED, OPEN, Field
 
 Bytes = NDArray[np.uint8]
 Shorts = NDArray[np.int32]
 
 
+class Turned(NamedTuple):
+    """Cells (A, N) of N points at each of A angles, relative to the sensor."""
+
+    columns: Shorts
+    rows: Shorts
+
+
+class Nodes(NamedTuple):
+    """Squares of poses at one angle: level, angle, column and row (S, 4) of each, and how well it fits at most (S,)."""
+
+    squares: Shorts
+    bounds: Shorts
+
+
 @kernel
 def squares(
-    levels: Bytes,
-    room: Bytes,
-    columns: Shorts,
-    rows: Shorts,
-    level: int,
-    angles: Ints,
-    box: tuple[int, int, int, int],
-    least: int,
-) -> tuple[Shorts, Shorts]:
-    """Squares of one size, at some of the angles, that may hold a pose of at least that fit: nodes, and their bounds.
+    field: Field, points: Turned, level: int, angles: Ints, box: tuple[int, int, int, int], least: int
+) -> Nodes:
+    """Squares of one size, at some of the angles, that may hold a pose of at least that fit, the best first.
 
-    columns, rows (A, N): cells of the points at each of A angles, relative to the sensor. box: first column and row,
-    and those behind the last. A node is (level, angle, column, row).
+    box: first column and row, and those behind the last.
     """
     side = 1 << level
     most = len(angles) * ((box[3] - box[1] + side - 1) // side) * ((box[2] - box[0] + side - 1) // side)
     nodes, bounds, n = np.empty((most, 4), np.int32), np.empty(most, np.int32), 0
     for row in range(box[1], box[3], side):
         for column in range(box[0], box[2], side):
-            if room[level, row, column] == 0:
+            if field.room[level, row, column] == 0:
                 continue
             for a in angles:
-                bound = fit_at(levels[level], columns[a], rows[a], column, row, least)
+                bound = fit_at(field.levels[level], points.columns[a], points.rows[a], column, row, least)
                 if bound >= least:
                     nodes[n, 0], nodes[n, 1], nodes[n, 2], nodes[n, 3] = level, a, column, row
                     bounds[n] = bound
                     n += 1
-    return nodes[:n], bounds[:n]
+    order = np.argsort(-bounds[:n], kind="mergesort")
+    return Nodes(nodes[order], bounds[order])
 
 
 @kernel
@@ -59,87 +68,60 @@ def fit_at(level: Bytes, columns: Shorts, rows: Shorts, column: int, row: int, l
 
 @kernel
 def best_pose(
-    levels: Bytes,
-    room: Bytes,
-    columns: Shorts,
-    rows: Shorts,
-    nodes: Shorts,
-    bounds: Shorts,
-    order: Ints,
-    least: int,
-    taken: Shorts,
-    apart: tuple[int, int],
+    field: Field, points: Turned, nodes: Nodes, least: int, taken: Shorts, apart: tuple[int, int]
 ) -> tuple[int, int, int, int]:
     """The pose of the best fit, at least that: fit, angle, column and row; -1 if there is none.
 
-    Poses within `apart` (angles, cells) of those taken (T, 3) do not count. nodes are those of `squares`, the best
-    first by `order`.
+    Poses within `apart` (angles, cells) of those taken (T, 3) do not count. nodes are those of `squares`.
     """
     best, found = least - 1, (-1, 0, 0, 0)
-    stack, stacked = np.empty((4 * LEVELS + 4, 4), np.int32), np.empty(4 * LEVELS + 4, np.int32)
-    children, marks = np.empty((4, 4), np.int32), np.empty(4, np.int32)
-    for i in order:
-        if bounds[i] <= best:
+    stack, children = _room_for(4 * LEVELS + 4), _room_for(4)
+    for i in range(len(nodes.bounds)):
+        if nodes.bounds[i] <= best:
             break
-        stack[0], stacked[0], n = nodes[i], bounds[i], 1
+        stack.squares[0], stack.bounds[0], n = nodes.squares[i], nodes.bounds[i], 1
         while n > 0:
             n -= 1
-            bound = stacked[n]
+            bound = stack.bounds[n]
             if bound <= best:
                 continue
-            level, a, column, row = stack[n]
+            level, a, column, row = stack.squares[n]
             if level == 0:
-                if not _is_taken(taken, a, column, row, len(columns), apart):
+                if not _is_taken(taken, a, column, row, len(points.columns), apart):
                     best, found = bound, (bound, a, column, row)
                 continue
-            n += _branch(
-                levels,
-                room,
-                columns[a],
-                rows[a],
-                stack[n].copy(),
-                best + 1,
-                children,
-                marks,
-                stack,
-                stacked,
-                n,
-            )
+            n += _branch(field, points, stack.squares[n].copy(), best + 1, children, stack, n)
     return found
+
+
+@inlined
+def _room_for(count: int) -> Nodes:
+    return Nodes(np.empty((count, 4), np.int32), np.empty(count, np.int32))
 
 
 @kernel
 def _branch(
-    levels: Bytes,
-    room: Bytes,
-    columns: Shorts,
-    rows: Shorts,
-    node: Shorts,
-    least: int,
-    children: Shorts,
-    marks: Shorts,
-    stack: Shorts,
-    stacked: Shorts,
-    n: int,
+    field: Field, points: Turned, node: Shorts, least: int, children: Nodes, stack: Nodes, n: int
 ) -> int:
     """Put the quarters of a node that may hold that fit on the stack, the best on top. Returns how many."""
-    level, half, count = node[0] - 1, 1 << (node[0] - 1), 0
+    level, half, count, room = node[0] - 1, 1 << (node[0] - 1), 0, field.room
+    columns, rows = points.columns[node[1]], points.rows[node[1]]
     for quarter in range(4):
         column, row = node[2] + half * (quarter % 2), node[3] + half * (quarter // 2)
         if row >= room.shape[1] or column >= room.shape[2] or room[level, row, column] == 0:
             continue
-        bound = fit_at(levels[level], columns, rows, column, row, least)
+        bound = fit_at(field.levels[level], columns, rows, column, row, least)
         if bound >= least:
             k = count
-            while k > 0 and marks[k - 1] > bound:
-                marks[k] = marks[k - 1]
-                children[k] = children[k - 1]
+            while k > 0 and children.bounds[k - 1] > bound:
+                children.bounds[k] = children.bounds[k - 1]
+                children.squares[k] = children.squares[k - 1]
                 k -= 1
-            marks[k] = bound
-            children[k, 0], children[k, 1], children[k, 2], children[k, 3] = level, node[1], column, row
+            children.bounds[k], child = bound, children.squares[k]
+            child[0], child[1], child[2], child[3] = level, node[1], column, row
             count += 1
     for k in range(count):
-        stack[n + k], stacked[n + k] = children[k], marks[k]
+        stack.squares[n + k], stack.bounds[n + k] = children.squares[k], children.bounds[k]
     return count
 
 
