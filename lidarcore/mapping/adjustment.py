@@ -37,18 +37,56 @@ class Observations(NamedTuple):
     variances: Array
 
 
+class Groups(NamedTuple):
+    """What is left of G groups, each of the patches of one keyframe in one cell.
+
+    squares    (G,) m² of the residual of their mean
+    variances  (G,) m² of that mean by noise alone
+    left       (G,) share of the square that the line did not take up
+    """
+
+    squares: Array
+    variances: Array
+    left: Array
+
+
 class NormalEquations(NamedTuple):
     """The normal equations of K poses, without the lines of the cells, and what is left of each group.
 
     information  (3 K, 3 K) sparse
     gradient     (3 K,)
-    groups       (G, 3) of the patches of one keyframe in one cell: squared residual of their mean, its variance by
-                 noise alone, and the share of it that the line did not take up
     """
 
     information: csr_array
     gradient: Array
-    groups: Array
+    groups: Groups
+
+
+class _Noise(NamedTuple):
+    """A patch has `scale` times its own variance, and all patches of a group share `unevenness` m²."""
+
+    scale: float
+    unevenness: float
+
+
+class _Sums(NamedTuple):
+    """What the G groups of K keyframes add up to: D - U U^T is the information, U's columns are those of the lines.
+
+    D (K, 3, 3), g (K, 3); U (G, 3, 2) with keyframe and line of each, at (G, 2).
+    """
+
+    D: Array
+    g: Array
+    U: Array
+    at: Ints
+
+
+class _Scratch(NamedTuple):
+    """Of one cell at a time: how far patches lie across and along, from their middle, m, and their weights."""
+
+    r: Array
+    t: Array
+    weights: Array
 
 
 def normal_equations(
@@ -61,14 +99,13 @@ def normal_equations(
     arms, normals = (rotate(poses[seen.keyframes, 2], v) for v in (seen.means, seen.normals))
     places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
     order, starts = _ordered(places, normals, size, seen.keyframes)
+    turned = Observations(seen.keyframes[order], arms[order], normals[order], seen.variances[order])
     K, G = len(poses), len(order)
-    D, g = np.zeros((K, 3, 3)), np.zeros((K, 3))
-    U, at, groups = np.empty((G, 3, 2)), np.empty((G, 2), np.int64), np.empty((G, 3))
-    number, shared = _sum(
-        seen.keyframes[order], poses, arms[order], normals[order], seen.variances[order], starts,
-        scale, unevenness**2, D, g, U, at, groups,
-    )  # fmt: skip
-    return NormalEquations(_sparse(D, U[:number], at[:number], shared), g.ravel(), groups[:number]), shared
+    sums = _Sums(np.zeros((K, 3, 3)), np.zeros((K, 3)), np.empty((G, 3, 2)), np.empty((G, 2), np.int64))
+    groups = Groups(*np.empty((3, G)))
+    number, shared = _sum(turned, starts, poses, _Noise(scale, unevenness**2), sums, groups)
+    information = _sparse(sums.D, sums.U[:number], sums.at[:number], shared)
+    return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups))), shared
 
 
 def _ordered(places: Array, normals: Array, size: float, keyframes: Ints) -> tuple[Ints, Ints]:
@@ -94,37 +131,28 @@ def _sparse(D: Array, U: Array, at: Ints, lines: int) -> csr_array:
 
 @kernel
 def _sum(
-    keyframes: Ints,
-    poses: Array,
-    arms: Array,
-    normals: Array,
-    variances: Array,
-    starts: Ints,
-    scale: float,
-    shared: float,
-    D: Array,
-    g: Array,
-    U: Array,
-    at: Ints,
-    groups: Array,
+    turned: Observations, starts: Ints, poses: Array, noise: _Noise, sums: _Sums, groups: Groups
 ) -> tuple[int, int]:
-    """Adds up the cells that several keyframes saw; returns the number of groups and of cells."""
+    """Adds up the cells that several keyframes saw, patches turned as the map is; the number of groups and of cells."""
+    keyframes, arms, variances = turned.keyframes, turned.means, turned.variances
+    D, g, U, at = sums.D, sums.g, sums.U, sums.at
     number, lines = 0, 0
     N, m, S = np.empty((2, 2)), np.empty(2), np.empty((3, 2))
-    weights, r, t = np.empty(len(keyframes)), np.empty(len(keyframes)), np.empty(len(keyframes))
+    r, t, weights = np.empty(len(keyframes)), np.empty(len(keyframes)), np.empty(len(keyframes))
+    scratch = _Scratch(r, t, weights)
     for cell in range(len(starts) - 1):
         low, high = starts[cell], starts[cell + 1]
         if keyframes[low] == keyframes[high - 1]:
             continue
-        nx, ny = _line(keyframes, poses, arms, normals, low, high, r, t)
-        _weigh(keyframes, variances, scale, shared, low, high, weights)
-        a, b = _fit(keyframes, variances, scale, shared, low, high, r, t, weights, N, m)
+        nx, ny = _line(turned, poses, low, high, scratch)
+        _weigh(turned, noise, low, high, weights)
+        a, b = _fit(turned, noise, low, high, scratch, N, m)
         det, l00, l10, l11 = _inverse_root(N)
         i = low
         while i < high:
             k, j = keyframes[i], i
             S[:] = 0.0
-            mean, noise, lever, total = 0.0, 0.0, 0.0, 0.0
+            mean, information, lever, total = 0.0, 0.0, 0.0, 0.0
             while j < high and keyframes[j] == k:
                 w, left = weights[j], r[j] - a - b * t[j]
                 J = nx, ny, ny * arms[j, 0] - nx * arms[j, 1]
@@ -135,7 +163,7 @@ def _sum(
                     for q in range(3):
                         D[k, p, q] += w * J[p] * J[q]
                 mean += left / variances[j]
-                noise += 1 / variances[j]
+                information += 1 / variances[j]
                 lever += w * t[j]
                 total += w
                 j += 1
@@ -145,8 +173,8 @@ def _sum(
             at[number, 0], at[number, 1] = k, lines
             lever /= max(total, 1e-12)
             leverage = total * (N[1, 1] - 2 * N[0, 1] * lever + N[0, 0] * lever * lever) / det
-            groups[number, 0], groups[number, 1] = (mean / noise) ** 2, 1 / noise
-            groups[number, 2] = 1 - leverage
+            groups.squares[number], groups.variances[number] = (mean / information) ** 2, 1 / information
+            groups.left[number] = 1 - leverage
             number += 1
             i = j
         lines += 1
@@ -163,10 +191,9 @@ def _inverse_root(N: Array) -> tuple[float, float, float, float]:
 
 
 @kernel
-def _line(
-    keyframes: Ints, poses: Array, arms: Array, normals: Array, low: int, high: int, r: Array, t: Array
-) -> tuple[float, float]:
+def _line(turned: Observations, poses: Array, low: int, high: int, scratch: _Scratch) -> tuple[float, float]:
     """Mean normal of a cell, and how far its patches lie across and along, from their middle."""
+    keyframes, arms, normals = turned.keyframes, turned.means, turned.normals
     nx = ny = x = y = 0.0
     for i in range(low, high):
         nx += normals[i, 0]
@@ -177,41 +204,29 @@ def _line(
     nx, ny = nx / norm, ny / norm
     for i in range(low, high):
         u, v = poses[keyframes[i], 0] + arms[i, 0] - x, poses[keyframes[i], 1] + arms[i, 1] - y
-        r[i], t[i] = nx * u + ny * v, nx * v - ny * u
+        scratch.r[i], scratch.t[i] = nx * u + ny * v, nx * v - ny * u
     return nx, ny
 
 
 @kernel
-def _weigh(
-    keyframes: Ints, variances: Array, scale: float, shared: float, low: int, high: int, weights: Array
-) -> None:
+def _weigh(turned: Observations, noise: _Noise, low: int, high: int, weights: Array) -> None:
     """Weight of each patch: its noise, and what it shares with the others of its group."""
-    i = low
+    keyframes, i = turned.keyframes, low
     while i < high:
         j = i
         while j < high and keyframes[j] == keyframes[i]:
             j += 1
         for k in range(i, j):
-            weights[k] = 1 / (scale * variances[k] + (j - i) * shared)
+            weights[k] = 1 / (noise.scale * turned.variances[k] + (j - i) * noise.unevenness)
         i = j
 
 
 @kernel
 def _fit(
-    keyframes: Ints,
-    variances: Array,
-    scale: float,
-    shared: float,
-    low: int,
-    high: int,
-    r: Array,
-    t: Array,
-    weights: Array,
-    N: Array,
-    m: Array,
+    turned: Observations, noise: _Noise, low: int, high: int, scratch: _Scratch, N: Array, m: Array
 ) -> tuple[float, float]:
     """Robust line r = a + b t; leaves the weights and the information N (2, 2) that it ended with."""
-    a = b = 0.0
+    r, t, weights, a, b = scratch.r, scratch.t, scratch.weights, 0.0, 0.0
     for turn in range(_PASSES):
         N[:], m[:] = 0.0, 0.0
         N[1, 1] = 1 / _TILT**2
@@ -226,9 +241,9 @@ def _fit(
         det = N[0, 0] * N[1, 1] - N[0, 1] * N[0, 1]
         a, b = (N[1, 1] * m[0] - N[0, 1] * m[1]) / det, (N[0, 0] * m[1] - N[0, 1] * m[0]) / det
         if turn < _PASSES - 1:
-            _weigh(keyframes, variances, scale, shared, low, high, weights)
+            _weigh(turned, noise, low, high, weights)
             for i in range(low, high):
-                off = (r[i] - a - b * t[i]) ** 2 / (scale * variances[i] + shared)
+                off = (r[i] - a - b * t[i]) ** 2 / (noise.scale * turned.variances[i] + noise.unevenness)
                 if off > _OUTLIER:
                     weights[i] *= (_OUTLIER / off) ** 2
     return a, b

@@ -22,7 +22,7 @@ from lidarcore.geometry import (
     squared_mahalanobis,
     wrap,
 )
-from lidarcore.mapping.adjustment import NormalEquations, Observations, normal_equations
+from lidarcore.mapping.adjustment import Groups, NormalEquations, Observations, normal_equations
 from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.patches import Patches
 
@@ -147,11 +147,11 @@ def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> 
     return csc_array(H + tied + diags_array(fixed)), g
 
 
-def _measured(groups: Array, cells: int, keyframes: int) -> tuple[float, float]:
+def _measured(groups: Groups, cells: int, keyframes: int) -> tuple[float, float]:
     """Factor of the noise's variance, and the standard deviation of what a group shares, from their residuals."""
-    free = 1 - 3 * keyframes / max(len(groups) - 2 * cells, 3 * keyframes + 1)
-    kept = groups[:, 2] > 0.2
-    squares, noise = groups[kept, 0] / (groups[kept, 2] * max(free, 0.2)), groups[kept, 1]
+    free = 1 - 3 * keyframes / max(len(groups.squares) - 2 * cells, 3 * keyframes + 1)
+    kept = groups.left > 0.2
+    squares, noise = groups.squares[kept] / (groups.left[kept] * max(free, 0.2)), groups.variances[kept]
     scale, shared = 1.0, 0.005**2
     for _ in range(10):
         expected = scale * noise + shared
