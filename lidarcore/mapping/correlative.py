@@ -4,6 +4,8 @@ The reference is a grid of scores. Blocks of shifts are judged at once on a grid
 never underrates them, and only blocks that may hold the best shift are looked into.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
@@ -23,6 +25,24 @@ _REACH = 3  # standard deviations, of the window and of the blur
 _NO_POSES = np.empty((0, 3))
 
 
+class _Window(NamedTuple):
+    """What poses are tried, around a guess, and which of them do not count; shifts and places in cells.
+
+    guess   (3,)
+    half    (2,) blocks to either side
+    turns   (T,) rad
+    sigma   (3,) standard deviations of the guess
+    others  (E, 3) shifts and turns of poses that are left out, with all within `close`, cells and rad (2,)
+    """
+
+    guess: Array
+    half: Ints
+    turns: Array
+    sigma: Array
+    others: Array
+    close: Array
+
+
 def search(
     reference: Array,
     points: Array,
@@ -37,36 +57,25 @@ def search(
     poses fit alike (along a corridor), the one nearest to the guess wins. The guess itself if no point is near.
     Poses close to those of `besides` (E, 3) are left out: what else might it be?
     """
-    window = np.minimum(_REACH * sigma, [settings.max_shift, settings.max_shift, settings.max_turn])
-    cell = settings.cell * (2 if window[:2].max() > _WIDE else 1)
+    most = np.minimum(_REACH * sigma, [settings.max_shift, settings.max_shift, settings.max_turn])
+    cell = settings.cell * (2 if most[:2].max() > _WIDE else 1)
     near = points[np.hypot(*points.T) < settings.horizon]
     near = near[:: max(1, len(near) // _ENOUGH)]
-    kept = reference[np.hypot(*(reference - guess[:2]).T) < settings.horizon + window[0]]
+    kept = reference[np.hypot(*(reference - guess[:2]).T) < settings.horizon + most[0]]
     if not len(near) or not len(kept):
         return guess
     low, fine = _grid(kept, cell, max(settings.blur, cell))
     step = cell / max(
         1.0, float(np.percentile(np.hypot(*near.T), 80))
     )  # rad that move far points by one cell
-    turns = step * np.arange(-np.floor(window[2] / step), np.floor(window[2] / step) + 1)
-    half = np.ceil(window[:2] / cell / _BLOCK).astype(np.int64)
-    origin = (guess[:2] - low) / cell
-    others = (besides - guess) / [cell, cell, 1.0]
+    turns = step * np.arange(-np.floor(most[2] / step), np.floor(most[2] / step) + 1)
+    half = np.ceil(most[:2] / cell / _BLOCK).astype(np.int64)
+    unit = np.array([cell, cell, 1.0])
+    others = (besides - guess) / unit
     others[:, 2] = wrap(others[:, 2])
-    close = np.array([_CLOSE / cell, _CLOSE_TURN])
-    best = _search(
-        fine,
-        _blocks(fine),
-        near / cell,
-        origin,
-        guess[2],
-        turns,
-        half,
-        sigma / [cell, cell, 1],
-        others,
-        close,
-    )
-    found: Array = guess + np.array(best) * [cell, cell, 1]
+    centre = np.array([*(guess[:2] - low) / cell, guess[2]])
+    window = _Window(centre, half, turns, sigma / unit, others, np.array([_CLOSE / cell, _CLOSE_TURN]))
+    found: Array = guess + np.array(_search(fine, _blocks(fine), near / cell, window)) * unit
     return found
 
 
@@ -103,23 +112,13 @@ def _blocks(fine: Array) -> Array:
 
 
 @kernel
-def _search(
-    fine: Array,
-    blocks: Array,
-    points: Array,
-    origin: Array,
-    heading: float,
-    turns: Array,
-    half: Ints,
-    sigma: Array,
-    others: Array,
-    close: Array,
-) -> tuple[float, float, float]:
+def _search(fine: Array, blocks: Array, points: Array, window: _Window) -> tuple[float, float, float]:
     """Best shift, in cells, and turn: the bounds of all blocks first, then the blocks from the best bound on."""
+    turns, half, sigma = window.turns, window.half, window.sigma
     u, v = np.empty(len(points)), np.empty(len(points))
     bounds = np.empty((len(turns), 2 * half[0] + 1, 2 * half[1] + 1))
     for t in range(len(turns)):
-        _place(points, heading + turns[t], origin, u, v)
+        _place(points, window.guess, turns[t], u, v)
         for a in range(bounds.shape[1]):
             for b in range(bounds.shape[2]):
                 du, dv = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
@@ -139,11 +138,11 @@ def _search(
             n % bounds.shape[2],
         )
         if t != placed:
-            _place(points, heading + turns[t], origin, u, v)
+            _place(points, window.guess, turns[t], u, v)
             placed = t
         for du in range((a - half[0]) * _BLOCK, (a - half[0] + 1) * _BLOCK):
             for dv in range((b - half[1]) * _BLOCK, (b - half[1] + 1) * _BLOCK):
-                if _close(others, du, dv, turns[t], close):
+                if _close(window, du, dv, turns[t]):
                     continue
                 total = _score(fine, u, v, du, dv, 0) - _penalty(du, dv, turns[t], sigma)
                 if total > best:
@@ -152,8 +151,9 @@ def _search(
 
 
 @kernel
-def _close(others: Array, du: float, dv: float, turn: float, close: Array) -> bool:
+def _close(window: _Window, du: float, dv: float, turn: float) -> bool:
     """True if a shift in cells and a turn are those of another pose."""
+    others, close = window.others, window.close
     for k in range(len(others)):
         away = (others[k, 0] - du) ** 2 + (others[k, 1] - dv) ** 2
         if away < close[0] * close[0] and abs(others[k, 2] - turn) < close[1]:
@@ -173,12 +173,12 @@ def _score(grid: Array, u: Array, v: Array, du: int, dv: int, shift: int) -> flo
 
 
 @kernel
-def _place(points: Array, heading: float, origin: Array, u: Array, v: Array) -> None:
-    """Turned and moved points, in cells."""
-    c, s = np.cos(heading), np.sin(heading)
+def _place(points: Array, guess: Array, turn: float, u: Array, v: Array) -> None:
+    """Points as they lie at a guess that is turned, in cells."""
+    c, s = np.cos(guess[2] + turn), np.sin(guess[2] + turn)
     for k in range(len(points)):
         x, y = rotate(c, s, points[k, 0], points[k, 1])
-        u[k], v[k] = origin[0] + x, origin[1] + y
+        u[k], v[k] = guess[0] + x, guess[1] + y
 
 
 @kernel
