@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from lidarcore.geometry import rotated_covariance
+
 Metres = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False, json_schema_extra={"unit": "m"})]
 Radians = Annotated[float, Field(gt=0, le=0.05, allow_inf_nan=False, json_schema_extra={"unit": "rad"})]
 Growth = Annotated[float, Field(ge=0, le=0.1, allow_inf_nan=False, json_schema_extra={"unit": "1/m"})]
@@ -135,10 +137,8 @@ class SensorNoise:
         """
         c, s = np.cos(bearings), np.sin(bearings)
         v_r, v_t = self.range_variances(ranges), (ranges * self.sigma_bearing) ** 2
-        v_xy = (v_r - v_t) * s * c
-        return np.stack(
-            [np.stack([v_r * c**2 + v_t * s**2, v_xy], -1), np.stack([v_xy, v_r * s**2 + v_t * c**2], -1)], -2
-        )
+        v_x, v_xy, v_y = rotated_covariance(c, s, v_r, np.zeros_like(v_r), v_t)
+        return np.stack([np.stack([v_x, v_xy], -1), np.stack([v_xy, v_y], -1)], -2)
 
 
 @lru_cache

@@ -4,16 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import chdtri
 
 from lidarcore.arrays import Array
 from lidarcore.features import Features
+from lidarcore.geometry import chi_square_gate, squared_mahalanobis
 
 GATE = 0.3  # m: a corner found farther away than this is another one
 MEMORY = 10  # frames a corner may be missing and still keep its id, if not told otherwise
-SAME = float(
-    chdtri(2, 1e-4)
-)  # Mahalanobis distance² between two sightings of one place: 1 in 10 000 is larger
+SAME = chi_square_gate(0.9999)  # Mahalanobis distance² between two sightings of one place
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,11 +123,7 @@ class Tracker:
             return np.empty((len(xy), 0))
         homes = np.array([self._known[i].home for i in ids])
         known = np.array([self._known[i].covariance for i in ids])
-        off = xy[:, None] - homes
-        distances: Array = (off[..., None, :] @ np.linalg.inv(covariances[:, None] + known) @ off[..., None])[
-            ..., 0, 0
-        ]
-        return distances
+        return squared_mahalanobis(xy[:, None] - homes, covariances[:, None] + known)
 
     def _moved(self, ids: list[int], xy: Array, covariances: Array) -> bool:
         """Whether most corners in view are no longer where they were: then the sensor moves."""

@@ -115,7 +115,7 @@ class LiveNavigation(NavigationSettings):
 
     method: Annotated[
         Literal["scans", "landmarks"],
-        Field(description="what SLAM finds the pose by: whole scans laid on each other, or landmarks"),
+        Field(description="what SLAM finds the pose by: whole scans matched to each other, or landmarks"),
     ] = "scans"
 
 

@@ -13,7 +13,9 @@ from lidarcore.geometry.gaussian import (
     ellipse_outline,
     fuse,
     largest_variance,
+    rotated_covariance,
     squared_mahalanobis,
+    squared_mahalanobis_2d,
 )
 from lidarcore.geometry.pose_track import PoseTrack
 from lidarcore.geometry.se2 import (
@@ -61,8 +63,10 @@ __all__ = [
     "relative",
     "relative_jacobians",
     "rotate",
+    "rotated_covariance",
     "rotation",
     "squared_mahalanobis",
+    "squared_mahalanobis_2d",
     "unit_vectors",
     "wrap",
 ]

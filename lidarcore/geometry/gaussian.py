@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import chdtri
 
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Numbers
 from lidarcore.errors import CovarianceError
 from lidarcore.geometry.se2 import unit_vectors
 
@@ -16,6 +16,19 @@ def squared_mahalanobis(difference: Array, covariance: Array) -> Array:
     solved = np.linalg.solve(covariance, difference[..., None])[..., 0]
     squared: Array = (difference * solved).sum(-1)
     return squared
+
+
+def squared_mahalanobis_2d(u: Numbers, v: Numbers, xx: Numbers, xy: Numbers, yy: Numbers) -> Numbers:
+    """e^T C^-1 e (...,) of differences (u, v) with covariances [xx xy; xy yy]; kernels compile this very function."""
+    return (yy * u * u - 2 * xy * u * v + xx * v * v) / (xx * yy - xy * xy)
+
+
+def rotated_covariance(
+    c: Numbers, s: Numbers, xx: Numbers, xy: Numbers, yy: Numbers
+) -> tuple[Numbers, Numbers, Numbers]:
+    """Entries xx, xy, yy of R C R^T with R of cosine c and sine s; kernels compile this very function."""
+    turned_xy = (c * c - s * s) * xy + c * s * (xx - yy)
+    return c * c * xx - 2 * c * s * xy + s * s * yy, turned_xy, s * s * xx + 2 * c * s * xy + c * c * yy
 
 
 @lru_cache
@@ -63,8 +76,10 @@ def ellipse_outline(xy: Array, covariance: Array, sigmas: float, points: int) ->
 
 
 def largest_variance(covariance: Array) -> Array:
-    """Variance (...,) along the longest axis of covariances (..., n, n)."""
-    return np.asarray(np.linalg.eigvalsh(covariance)[..., -1], np.float64)
+    """Variance (...,) along the longest axis of covariances (..., 2, 2)."""
+    xx, xy, yy = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
+    largest: Array = (xx + yy) / 2 + np.hypot((xx - yy) / 2, xy)
+    return largest
 
 
 def check_covariance(matrices: ArrayLike, name: str) -> None:

@@ -4,9 +4,12 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import inlined, kernel
+from lidarcore.geometry import gaussian
 from lidarcore.geometry.se2 import wrapped
 
 wrap = inlined(wrapped)
+squared_mahalanobis_2d = inlined(gaussian.squared_mahalanobis_2d)
+rotated_covariance = inlined(gaussian.rotated_covariance)
 
 
 @inlined
@@ -30,12 +33,6 @@ def compose_with_jacobians(T_a_b: Array, T_b_c: Array) -> tuple[Array, Array, Ar
     F[0, 2], F[1, 2] = -y, x
     G[0, 0], G[0, 1], G[1, 0], G[1, 1] = c, -s, s, c
     return np.array([T_a_b[0] + x, T_a_b[1] + y, wrap(T_a_b[2] + T_b_c[2])]), F, G
-
-
-@inlined
-def squared_mahalanobis_2d(u: float, v: float, xx: float, xy: float, yy: float) -> float:
-    """e^T C^-1 e of a difference (u, v) with the covariance [xx xy; xy yy]."""
-    return (yy * u * u - 2 * xy * u * v + xx * v * v) / (xx * yy - xy * xy)
 
 
 @kernel

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lidarcore.errors import LandmarkError
+from lidarcore.geometry import largest_variance
 from lidarcore.scan import Array
 
 MAX_COORDINATE = 1e7  # m; farther than across a continent is surely another unit
@@ -71,7 +72,7 @@ class Landmark:
     @property
     def sigma(self) -> float:
         """Standard deviation along the longest axis of the ellipse, m."""
-        return math.sqrt(largest_variance(self.var_x, self.cov_xy, self.var_y))
+        return math.sqrt(largest_variance(self.covariance))
 
     def _check(self) -> None:
         if not math.isfinite(self.x + self.y + self.first_seen + self.last_seen):
@@ -80,7 +81,7 @@ class Landmark:
             )
         if max(abs(self.x), abs(self.y)) > MAX_COORDINATE:
             raise LandmarkError(f"The position ({self.x:g}, {self.y:g}) is too far away: give metres.")
-        check_covariance(self.var_x, self.cov_xy, self.var_y)
+        _check_entries(self.var_x, self.cov_xy, self.var_y)
         if max(abs(self.first_seen), abs(self.last_seen)) > MAX_TIME:
             raise LandmarkError(
                 f"Seen {self.first_seen:g} to {self.last_seen:g} s is not a time: give seconds."
@@ -99,19 +100,14 @@ class Landmark:
             )
 
 
-def check_covariance(var_x: float, cov_xy: float, var_y: float) -> None:
-    """Raises LandmarkError unless the three numbers (m²) are a positive definite covariance."""
+def _check_entries(var_x: float, cov_xy: float, var_y: float) -> None:
+    """Raises LandmarkError unless these are a covariance that the map takes, m²: each of thousands that are read."""
     most = MAX_COORDINATE**2
     if not (0 < var_x <= most and 0 < var_y <= most and cov_xy**2 < (1 - _SINGULAR) * var_x * var_y):
         raise LandmarkError(
             f"The covariance [[{var_x:g}, {cov_xy:g}], [{cov_xy:g}, {var_y:g}]] m² is not positive definite: "
             "give variances above 0 and less than full correlation."
         )
-
-
-def largest_variance(var_x: float, cov_xy: float, var_y: float) -> float:
-    """The larger eigenvalue of a 2x2 covariance."""
-    return (var_x + var_y) / 2 + math.hypot((var_x - var_y) / 2, cov_xy)
 
 
 def as_position(xy: ArrayLike) -> tuple[float, float]:
@@ -126,7 +122,7 @@ def as_covariance(covariance: ArrayLike) -> tuple[float, float, float]:
     if abs(c[0, 1] - c[1, 0]) > 1e-9 * abs(c).max():
         raise LandmarkError(f"The covariance {c.tolist()} m² is not symmetric.")
     triple = float(c[0, 0]), float(c[0, 1] + c[1, 0]) / 2, float(c[1, 1])
-    check_covariance(*triple)
+    _check_entries(*triple)
     return triple
 
 

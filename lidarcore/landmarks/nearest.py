@@ -7,7 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from lidarcore.landmarks.landmark import Landmark, largest_variance
+import numpy as np
+
+from lidarcore.geometry import largest_variance
+from lidarcore.landmarks.landmark import Landmark
 from lidarcore.landmarks.queries import IN_BOX, SELECTED, SQUARED_DISTANCE, Box, Filter, joined
 
 Metric = Literal["euclidean", "mahalanobis"]
@@ -49,7 +52,8 @@ class Neighbourhood:
     ) -> None:
         self._connection = connection
         self._xy = xy
-        self._variance = largest_variance(*covariance)
+        r_xx, r_xy, r_yy = covariance
+        self._variance = float(largest_variance(np.array([[r_xx, r_xy], [r_xy, r_yy]])))
         of_session = ("landmarks.session = :session", {"session": session})
         self._filter, parameters = joined([of_session, which.clauses()])
         names = ("cx", "cy", "r_xx", "r_xy", "r_yy")

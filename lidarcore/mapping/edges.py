@@ -5,6 +5,7 @@ import numpy as np
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
 from lidarcore.geometry.kernels import unrotate, wrap
+from lidarcore.mapping.doubt import compiled_trust
 
 
 @kernel
@@ -22,12 +23,12 @@ def linearise(
 ) -> float:
     """Blocks (E, 6, 6) of the information, by both ends of each edge; adds to the gradient b (3 N,).
 
-    Returns chi-square. An edge counts less from a chi-square of its doubt (E,) on [Agarwal 2013 (15)].
+    Returns chi-square. An edge counts less from a chi-square of its doubt (E,) on.
     """
     total, e, J, We, WJ = 0.0, np.empty(3), np.zeros((3, 6)), np.empty(3), np.empty((3, 6))
     for k in range(len(ends)):
         chi2 = _error(poses[ends[k, 0]], poses[ends[k, 1]], relatives[k], informations[k], e, J, We, WJ)
-        weight = min(1.0, 2 / (1 + chi2 / doubts[k])) ** 2
+        weight = compiled_trust(chi2, doubts[k])
         total += weight * chi2
         for m in range(6):
             g = J[0, m] * We[0] + J[1, m] * We[1] + J[2, m] * We[2]

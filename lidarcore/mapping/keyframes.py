@@ -1,4 +1,4 @@
-"""Keyframes: the scans that make the map, with what is laid and compared of them."""
+"""Keyframes: the scans that make the map, with what is matched and compared of them."""
 
 from collections.abc import Sequence
 from typing import NamedTuple

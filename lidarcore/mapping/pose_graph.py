@@ -17,9 +17,9 @@ from lidarcore.arrays import Array, Ints
 from lidarcore.errors import LocalizationError
 from lidarcore.geometry import UncertainPose, as_pose_covariance, relative, relative_jacobians, wrap
 from lidarcore.localization.ekf.estimate import as_pose
+from lidarcore.mapping.doubt import DOUBTFUL
 from lidarcore.mapping.edges import edge_errors, linearise
 
-_DOUBTFUL = 11.34  # chi-square of three degrees of freedom, 99 %: from here on a doubted edge counts less
 _COOLING = 4.0  # by which doubts about new edges set in earlier from round to round
 _FIXED = 1e12  # information of the first pose
 
@@ -80,7 +80,7 @@ class PoseGraph:
         self._ends = np.concatenate([self._ends, [[i, j]]])
         self._relatives = np.concatenate([self._relatives, z[None]])
         self._informations = np.concatenate([self._informations, information[None]])
-        self._doubts = np.append(self._doubts, _DOUBTFUL if doubted else np.inf)
+        self._doubts = np.append(self._doubts, DOUBTFUL if doubted else np.inf)
         self._recovery = None
 
     def optimize(self, tolerance: float = 1e-6, rounds: int = 50) -> float:

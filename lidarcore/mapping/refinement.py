@@ -13,8 +13,17 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import UncertainPose, pose_difference, relative, relative_jacobians, rotation, wrap
+from lidarcore.geometry import (
+    UncertainPose,
+    pose_difference,
+    relative,
+    relative_jacobians,
+    rotation,
+    squared_mahalanobis,
+    wrap,
+)
 from lidarcore.mapping.adjustment import NormalEquations, Observations, normal_equations
+from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.patches import Patches
 
 _FIXED = 1e12  # information of the first pose
@@ -121,12 +130,12 @@ def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> 
     H, g = equations.information, equations.gradient.copy()
     ends = np.array([(step.i, step.j) for step in steps], np.int64).reshape(-1, 2)
     z = np.array([step.pose for step in steps]).reshape(-1, 3)
-    W = np.linalg.inv(np.array([step.covariance for step in steps]).reshape(-1, 3, 3))
+    covariances = np.array([step.covariance for step in steps]).reshape(-1, 3, 3)
     a, b = poses[ends[:, 0]], poses[ends[:, 1]]
     A, B = relative_jacobians(a, b)
     e = pose_difference(relative(a, b), z)
-    chi2 = np.einsum("ni,nij,nj->n", e, W, e)
-    W = W * (np.minimum(1.0, 2 / (1 + chi2 / 11.34)) ** 2)[:, None, None]
+    weights = trust(squared_mahalanobis(e, covariances), DOUBTFUL)
+    W = np.linalg.inv(covariances) * weights[:, None, None]
     J = np.concatenate([A, B], -1)
     blocks = np.swapaxes(J, -1, -2) @ W @ J
     index = (3 * ends[:, :, None] + np.arange(3)).reshape(-1, 6)

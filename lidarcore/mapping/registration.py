@@ -7,6 +7,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.geometry.kernels import rotate, wrap
+from lidarcore.mapping.doubt import DOUBTFUL, compiled_trust
 from lidarcore.mapping.patches import Patches
 from lidarcore.mapping.surfels import Surfels, nearest
 
@@ -14,7 +15,6 @@ _SIDE = 0.8  # cosine of the largest angle between two surfaces that can be the 
 _ROUNDS, _CONVERGED = 25, 1e-4  # m and rad
 _SHRINK, _LEAST = 0.7, 1 / 3  # the reach falls by this factor each round, down to this share
 _CAUCHY = 4.0  # squared standard deviations at which a distance counts half
-_DOUBT = 11.34  # chi-square of three degrees of freedom, 99 %: from here on the guess counts less
 
 
 class Registration(NamedTuple):
@@ -60,8 +60,7 @@ def _register(
         _without_pretence(H, B, g)
         off = guess - x
         off[2] = wrap(off[2])
-        trust = min(1.0, 2 / (1 + float(off @ prior @ off) / _DOUBT))
-        weight = trust * trust
+        weight = compiled_trust(off @ prior @ off, DOUBTFUL)
         H += weight * prior
         step = np.linalg.solve(H, weight * (prior @ off) - g)
         x += step

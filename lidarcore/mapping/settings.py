@@ -19,7 +19,7 @@ _CONFIG = ConfigDict(extra="forbid")
 
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
 class MatchSettings:
-    """How two scans are laid on each other. Immutable; pydantic.ValidationError names a wrong field."""
+    """How two scans are matched to each other. Immutable; pydantic.ValidationError names a wrong field."""
 
     noise: SensorNoise = field(default_factory=SensorNoise)
     radius: Annotated[
@@ -48,7 +48,7 @@ class MatchSettings:
 
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
 class FrontSettings:
-    """How a scan is laid on the local map, and which scans make it."""
+    """How a scan is matched to the local map, and which scans make it."""
 
     match: MatchSettings = field(default_factory=MatchSettings)
     odometry: OdometryNoise = field(
@@ -89,7 +89,9 @@ class LoopSettings:
     ] = 2.5
     farthest: Annotated[float, number(1, 100, "m", "no earlier place is farther than this")] = 20.0
     apart: Annotated[int, Field(ge=1, le=1000, description="keyframes between two that make a loop")] = 10
-    before: Annotated[int, Field(ge=0, le=20, description="keyframes before one that are laid with it")] = 4
+    before: Annotated[
+        int, Field(ge=0, le=20, description="keyframes before one that are matched with it")
+    ] = 4
     places: Annotated[
         int, Field(ge=1, le=50, description="passes that one scan is matched with, at most")
     ] = 4

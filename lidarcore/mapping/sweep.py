@@ -1,7 +1,7 @@
 """How the sensor moved while it took a scan, by what scans say of it.
 
-A revolution takes a tenth of a second. Wheels tell a turn in it to some hundredths of a radian per second, scans laid
-on a map far better: so a scan is laid twice, the second time without the motion that the first one found.
+A revolution takes a tenth of a second. Wheels tell a turn in it to some hundredths of a radian per second, scans
+matched to a map far better: so a scan is matched twice, the second time without the motion that the first one found.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""The pose from whole scans: each one is laid on the last keyframes at once, and the map behind catches up."""
+"""The pose from whole scans: each one is matched to the last keyframes at once, and the map behind catches up."""
 
 from collections.abc import Callable
 
@@ -102,7 +102,7 @@ class WholeScans:
     def step(
         self, scan: Scan, features: Features | None = None, clusters: Clusters | None = None
     ) -> TrackingResult:
-        """Place a scan that `deskewed` gave. After a break of clock or odometry the map begins anew."""
+        """Place a scan that `deskewed` gave. After a break of clock or odometry a new map begins."""
         try:
             tracked, message = self._front.step(scan, self._removed(scan)), None
         except MotionError as error:

@@ -36,7 +36,7 @@ const METHODS = [
 ];
 
 const METHOD_HINT =
-  "What SLAM finds the pose by. Whole scans: each is laid on the last ones, and the map becomes a grid with walls. Corners and clusters: an extended Kalman filter on landmarks";
+  "What SLAM finds the pose by. Whole scans: each is matched to the last ones, and the map becomes a grid with walls. Corners and clusters: an extended Kalman filter on landmarks";
 
 /** What SLAM finds the pose by: whole scans, or landmarks of a kind. */
 const method = {

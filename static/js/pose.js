@@ -16,7 +16,7 @@ export function errorOf({ pose, truth }) {
   return { distance: Math.hypot(pose.x - x, pose.y - y), heading: turn };
 }
 
-/** Whether whole scans tell the pose: they make a map, or are laid on the grid of one. */
+/** Whether whole scans tell the pose: they make a map, or are matched to the grid of one. */
 export const isOfScans = ({ mode, method }, localization) =>
   mode === "slam" ? method === "scans" : mode === "localize" && localization.method === "scans";
 

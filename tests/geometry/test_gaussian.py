@@ -19,6 +19,7 @@ from lidarcore.geometry import (
     fuse,
     kernels,
     largest_variance,
+    rotated_covariance,
     rotation,
     squared_mahalanobis,
 )
@@ -88,6 +89,25 @@ def test_outline_axes_and_area_are_of_one_ellipse(shape: tuple[int, ...], sigmas
     shoelace = np.abs((x[..., :-1] * y[..., 1:] - y[..., :-1] * x[..., 1:]).sum(-1)) / 2
     np.testing.assert_allclose(shoelace, ellipse_area(C, sigmas), rtol=1e-4)
     np.testing.assert_allclose(C @ directions, directions * (half[..., None, :] / sigmas) ** 2, atol=1e-9)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_the_largest_variance_is_the_larger_eigenvalue(shape: tuple[int, ...]) -> None:
+    C = covariances(shape)
+    np.testing.assert_allclose(largest_variance(C), np.linalg.eigvalsh(C)[..., -1], rtol=1e-12)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_entries_of_a_turned_covariance_are_those_of_its_matrix(shape: tuple[int, ...]) -> None:
+    C, angle = covariances(shape), np.random.default_rng(1).uniform(-np.pi, np.pi, shape)
+    R = rotation(angle)
+    expected = R @ C @ np.swapaxes(R, -1, -2)
+    entries = np.cos(angle), np.sin(angle), C[..., 0, 0], C[..., 0, 1], C[..., 1, 1]
+    for found, (i, j) in zip(rotated_covariance(*entries), [(0, 0), (0, 1), (1, 1)], strict=True):
+        np.testing.assert_allclose(found, expected[..., i, j], atol=1e-12)
+    for k in np.ndindex(shape):
+        compiled = kernels.rotated_covariance(*(float(entry[k]) for entry in entries))
+        np.testing.assert_allclose(compiled, [e[k] for e in rotated_covariance(*entries)], atol=1e-12)
 
 
 def test_an_ellipse_turns_with_its_covariance() -> None:

@@ -7,18 +7,18 @@ import numpy as np
 from lidarcore.evaluation.repeatability.wall_tracker import WallTracker, told_near
 from lidarcore.extraction import extract
 from lidarcore.features import Features
+from lidarcore.geometry import contains
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings
 
-_LEAST = 10  # sightings of a wall
+_LEAST = 10  # observations of a wall
 _HELD = 0.95  # of the scatter of walls, by ellipses of 95 %
 _WINDOW = 100  # scans: what drifts for longer is not noise
 _SETTLING = (
     10  # scans after a start, of real sensors: walls lie four times as far off as later, and then no more
 )
 
-_CHI2_95 = 5.991464547
 _STEPS = np.linspace(0.0, 1.0, 21)
 
 
@@ -31,15 +31,15 @@ def renewal(scans: list[Scan], noise: SensorNoise) -> float:
     """
     if noise.unevenness == 0:
         return 1.0
-    needed, sightings = [], []
+    needed, observations = [], []
     for begin in range(_SETTLING if len(scans) > 4 * _SETTLING else 0, len(scans), _WINDOW):
         window = scans[begin : begin + _WINDOW]
-        least, most = (_sightings(window, noise, share) for share in (0.0, 1.0))
+        least, most = (_observations(window, noise, share) for share in (0.0, 1.0))
         for wall, first in least.items():
             if len(first) >= _LEAST and len(most[wall]) == len(first):
                 needed.append(_needed(first, most[wall]))
-                sightings.append(len(first))
-    return _weighted_median(np.array(needed), np.array(sightings)) if needed else 1.0
+                observations.append(len(first))
+    return _weighted_median(np.array(needed), np.array(observations)) if needed else 1.0
 
 
 def _needed(repeated: Array, anew: Array) -> float:
@@ -47,8 +47,7 @@ def _needed(repeated: Array, anew: Array) -> float:
     errors = (repeated[:, :2] - repeated[:, :2].mean(0)) / np.sqrt(1 - 1 / len(repeated))
     c0, c1 = (rows[:, 2:].reshape(-1, 2, 2) for rows in (repeated, anew))
     for share in _STEPS.tolist():
-        solved = np.linalg.solve(c0 + share * (c1 - c0), errors[..., None])[..., 0]
-        if np.mean((errors * solved).sum(1) <= _CHI2_95) >= _HELD:
+        if contains(errors, c0 + share * (c1 - c0), _HELD).mean() >= _HELD:
             return float(share)
     return 1.0
 
@@ -79,7 +78,7 @@ def _shifts(before: Array, after: Array) -> Array:
     return shifts
 
 
-def _sightings(scans: list[Scan], noise: SensorNoise, share: float) -> dict[int, Array]:
+def _observations(scans: list[Scan], noise: SensorNoise, share: float) -> dict[int, Array]:
     """Each wall's observations (N, 6): alpha rad, r m, their covariance if that share is sampled again in each scan."""
     told = {name: getattr(noise, name) for name in noise.__dataclass_fields__} | {"renewal": share}
     settings = ExtractionSettings(noise=SensorNoise(**told))
@@ -89,6 +88,7 @@ def _sightings(scans: list[Scan], noise: SensorNoise, share: float) -> dict[int,
         rows, lines = tracker.rows({found.fitter: found}), found.lines
         walls = [row.index[found.fitter] for row in rows]
         table = np.column_stack([lines.alpha, lines.r, lines.covariance_consistent.reshape(-1, 4)])[walls]
-        for row, sighting in zip(rows, told_near(table, np.array([row.near for row in rows])), strict=True):
-            seen.setdefault(row.id, []).append(sighting)
+        told_rows = told_near(table, np.array([row.near for row in rows]))
+        for row, one in zip(rows, told_rows, strict=True):
+            seen.setdefault(row.id, []).append(one)
     return {wall: np.array(rows) for wall, rows in seen.items()}

@@ -8,6 +8,7 @@ from scipy.special import chdtrc, ndtri
 
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.intervals import LEVEL, Interval
+from lidarcore.geometry import squared_mahalanobis
 from lidarcore.scan import Array
 
 _Z = float(ndtri((1 + LEVEL) / 2))
@@ -150,5 +151,4 @@ def _same(beta: Array, covariance: Array) -> float:
     if len(beta) < 2:
         return 1.0
     D = np.diff(np.eye(len(beta)), axis=0)
-    difference = D @ beta
-    return float(chdtrc(len(D), difference @ np.linalg.solve(D @ covariance @ D.T, difference)))
+    return float(chdtrc(len(D), squared_mahalanobis(D @ beta, D @ covariance @ D.T)))

@@ -7,7 +7,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.evaluation.maps.accuracy import reference_poses
-from lidarcore.geometry import wrap
+from lidarcore.geometry import squared_mahalanobis, wrap
 from lidarcore.mapping.grid.builder import build_grid
 from lidarcore.mapping.grid.occupancy import OccupancyGrid
 from lidarcore.mapping.walls.spread import joint_spread
@@ -102,7 +102,7 @@ def _line_chi2(walls: Walls, i: int, true: Array) -> float:
     if abs(turn) > np.pi / 2:
         turn, r = float(wrap(turn + np.pi)), -r
     e = np.array([turn, walls.r[i] - r])
-    return float(e @ np.linalg.solve(walls.line_covariance[i], e))
+    return float(squared_mahalanobis(e, walls.line_covariance[i]))
 
 
 def _views(world: World, wall: Array, poses: Array) -> int:

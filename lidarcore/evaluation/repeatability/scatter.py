@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TypeVar, cast
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.consistency.figures import GATES
 from lidarcore.evaluation.intervals import LEVEL, intervals, shares, wilson
 from lidarcore.evaluation.repeatability.summary import FeatureClaim, FeatureScatter, Judgement, Matrix
+from lidarcore.geometry import squared_mahalanobis_2d
 from lidarcore.scan import Array, Ints
 
 LEAST = 10
@@ -183,9 +184,8 @@ def scatter(observations: Observations, scans: int) -> Scatter:
     x, y = np.where(seen[:, None], table[:, :2] - means[:, :2, feature], 0.0).swapaxes(0, 1)
     squares = np.stack([x * x, x * y, y * y], 1)
     shrunk = (1 - 1 / np.maximum(counts, LEAST))[:, feature]
-    nees = (
-        _mahalanobis(squares[:, None], table[:, 2:].reshape(len(table), len(KINDS), 4, -1)) / shrunk[:, None]
-    )
+    claimed = table[:, 2:].reshape(len(table), len(KINDS), 4, -1)
+    nees = _squared_mahalanobis(x[:, None], y[:, None], claimed) / shrunk[:, None]
     judged = seen & (counts >= LEAST)[:, feature]
     hits = _tally(nees, judged, feature, len(starts))
     scan_hits = _tally(nees, judged, observations.scans, scans)
@@ -234,15 +234,14 @@ def _root_det(c: Array) -> Array:
     return root
 
 
-def _mahalanobis(squares: Array, c: Array) -> Array:
-    """e^T C^-1 e (..., R) from the products xx, xy, yy of e (..., 3, R) and C (..., 4, R).
+def _squared_mahalanobis(x: Array, y: Array, c: Array) -> Array:
+    """e^T C^-1 e (..., R) of e = (x, y) (..., R) and C (..., 4, R).
 
-    NaN, which no ellipse holds, where C is NaN.
+    Infinite, so that no ellipse holds it, where C is NaN or not positive definite.
     """
-    xx, xy, yy = np.moveaxis(squares, -2, 0)
-    c_xx, c_xy, _, c_yy = np.moveaxis(c, -2, 0)
+    xx, xy, _, yy = np.moveaxis(c, -2, 0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return cast(Array, (c_yy * xx - 2 * c_xy * xy + c_xx * yy) / _root_det(np.moveaxis(c, -2, -1)) ** 2)
+        return np.where(xx * yy > xy * xy, squared_mahalanobis_2d(x, y, xx, xy, yy), np.inf)
 
 
 def _sums(values: Array, starts: Ints) -> Array:

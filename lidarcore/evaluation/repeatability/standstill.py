@@ -19,7 +19,7 @@ def moves(features: Observations, newest: int) -> bool:
 
 @kernel
 def _moves(xy: Array, scans: Ints, ends: Ints, newest: int) -> bool:
-    """Whether it leapt, or most features that stay in view drift. Feature k has the sightings from ends[k] to its next.
+    """Whether the sensor leapt, or most features that stay in view drift. Observations of feature k begin at ends[k].
 
     What came or went in the middle of the window has nothing to tell of a drift.
     """
@@ -43,7 +43,7 @@ def _leapt(recent: int, new: int, newest: int) -> bool:
 
 @inlined
 def _drifts(xy: Array) -> bool:
-    """Whether a feature (n, 2) m lies elsewhere in its last third of sightings than in the first.
+    """Whether a feature (n, 2) m lies elsewhere in its last third of observations than in the first.
 
     By _SIGMAS standard errors. The noise is taken from successive differences, which a slow drift hardly enters. Real
     sensors' errors are correlated from scan to scan (0.3 in real recordings), so the limit is wider than chance alone

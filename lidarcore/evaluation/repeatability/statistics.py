@@ -22,7 +22,7 @@ from lidarcore.lines import FITTERS
 from lidarcore.tracking import CornerRow, Tracker
 
 WINDOW = 100
-_FOLLOW = 0.1  # of the way to a new sighting that the known place of a feature goes
+_FOLLOW = 0.1  # of the way to a new observation that the known place of a feature goes
 
 
 class Repeatability:

@@ -30,7 +30,7 @@ class WallRow:
 class _Known:
     """K walls as they were seen so far, the oldest first.
 
-    ids, frames (K,) of the last sighting; near (K,) rad, alpha of the first; lines (K, 4) alpha, r, begin, end: from
+    ids, frames (K,) of the last observation; near (K,) rad, alpha of the first; lines (K, 4) alpha, r, begin, end: from
     where to where along it (m).
     """
 
@@ -61,7 +61,7 @@ class WallTracker:
     changed extent is part of what is judged. Methods share a segmentation: pieces are matched by their beams.
 
     memory   frames a wall may be missing and still keep its id
-    follow   share of the way to a new sighting that the known wall goes
+    follow   share of the way to a new observation that the known wall goes
     """
 
     def __init__(self, memory: int, follow: float = 1.0) -> None:
@@ -96,7 +96,7 @@ class WallTracker:
         return np.array(at, np.int64)
 
     def _follow(self, at: Ints, lines: Array) -> None:
-        """Move known walls towards their sightings (P, 6)."""
+        """Move known walls towards their observations (P, 6)."""
         before = self._known.lines[at]
         alpha, r = unwrapped(lines, before[:, 0])
         seen = np.column_stack([alpha, r, _along(lines, before[:, 0])])
@@ -121,10 +121,10 @@ def unwrapped(lines: Array, near: Array) -> tuple[Array, Array]:
     return near + off - np.where(turned, np.copysign(np.pi, off), 0.0), np.where(turned, -r, r)
 
 
-def told_near(sightings: Array, near: Array) -> Array:
-    """Sightings (..., 2 + 4 n) of lines, alpha, r and n covariances of them, with the alpha next to `near` (rad)."""
-    told = sightings.copy()
-    told[..., 0], told[..., 1] = unwrapped(sightings, near)
+def told_near(observations: Array, near: Array) -> Array:
+    """Observations (..., 2 + 4 n) of lines, alpha, r and n covariances of them, with the alpha next to `near` (rad)."""
+    told = observations.copy()
+    told[..., 0], told[..., 1] = unwrapped(observations, near)
     signs = np.where(told[..., 1:2] < 0, -1.0, 1.0)
     for covariance_of_both in (3, 4):
         told[..., covariance_of_both::4] *= signs

@@ -65,7 +65,7 @@ class FeatureWindow:
         return self._sorted(np.concatenate([nothing, *(record.table for record in self._records)]))
 
     def firsts(self) -> Observations:
-        """The two coordinates (R, 2) of each sighting by the first method that has it, sorted by feature."""
+        """The two coordinates (R, 2) of each observation by the first method that has it, sorted by feature."""
         return self._sorted(self._firsts.table)
 
     def _sorted(self, table: Array) -> Observations:

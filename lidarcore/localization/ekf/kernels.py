@@ -7,7 +7,7 @@ are T_world_sensor. Both are changed in place.
 import numpy as np
 
 from lidarcore.compiled import inlined, kernel
-from lidarcore.geometry.kernels import squared_mahalanobis_2d, unrotate, wrap
+from lidarcore.geometry.kernels import rotated_covariance, squared_mahalanobis_2d, unrotate, wrap
 from lidarcore.scan import Array, Ints
 
 
@@ -58,9 +58,8 @@ def expect(pose: Array, P: Array, xy: Array, cross: Array, own: Array) -> tuple[
         b = own[i, 0, 1] + P[0, 1] + dx * P[0, 2] - dy * P[1, 2] - dx * dy * P[2, 2]
         b -= X[0, 1] - dy * X[2, 1] + X[1, 0] + dx * X[2, 0]
         z[i, 0], z[i, 1] = unrotate(c, s, dx, dy)
-        S[i, 0, 0] = c * c * a + 2 * c * s * b + s * s * d
-        S[i, 1, 1] = s * s * a - 2 * c * s * b + c * c * d
-        S[i, 0, 1] = S[i, 1, 0] = (c * c - s * s) * b + c * s * (d - a)
+        S[i, 0, 0], S[i, 0, 1], S[i, 1, 1] = rotated_covariance(c, -s, a, b, d)
+        S[i, 1, 0] = S[i, 0, 1]
     return z, S
 
 

@@ -6,7 +6,7 @@ States begin with T_world_sensor; a step gives the next state, its Jacobian and 
 import numpy as np
 
 from lidarcore.compiled import kernel
-from lidarcore.geometry.kernels import compose_with_jacobians, rotate
+from lidarcore.geometry.kernels import compose_with_jacobians, rotate, rotated_covariance
 from lidarcore.localization.ekf.kernels import odometry_variances, propagate
 from lidarcore.scan import Array
 
@@ -61,8 +61,8 @@ def by_odometry(pose: Array, dt: float, increment: Array, noise: Array) -> tuple
     moved, F, G = compose_with_jacobians(pose, increment)
     ahead, across, turn = odometry_variances(increment, dt, noise)
     c, s, Q = G[0, 0], G[1, 0], np.zeros((3, 3))
-    Q[0, 0], Q[1, 1], Q[2, 2] = c * c * ahead + s * s * across, s * s * ahead + c * c * across, turn
-    Q[0, 1] = Q[1, 0] = c * s * (ahead - across)
+    Q[0, 0], Q[0, 1], Q[1, 1] = rotated_covariance(c, s, ahead, 0.0, across)
+    Q[1, 0], Q[2, 2] = Q[0, 1], turn
     return moved, F, Q
 
 

@@ -1,4 +1,4 @@
-"""The pose between the cells: points are laid on what stands nearest, along the normal of the distance to it."""
+"""The pose between the cells: points are matched to what stands nearest, along the normal of the distance to it."""
 
 import numpy as np
 from scipy.ndimage import map_coordinates

@@ -17,7 +17,7 @@ class RelocationSettings:
     ] = 0.1
     spacing: Annotated[float, number(0.02, 1.0, "m", "points closer together than this count once")] = 0.15
     most_points: Annotated[
-        int, Field(ge=20, le=2000, description="points that are laid on the map at most")
+        int, Field(ge=20, le=2000, description="points that are matched to the map at most")
     ] = 150
     least_points: Annotated[
         int, Field(ge=5, le=2000, description="with fewer points nothing is looked for")

@@ -1,0 +1,19 @@
+"""How much counts what does not agree with the rest [Agarwal et al. 2013]."""
+
+import numpy as np
+
+from lidarcore.arrays import Numbers
+from lidarcore.compiled import inlined
+from lidarcore.geometry import chi_square_gate
+
+DOUBTFUL = chi_square_gate(0.99, 3)
+"""Chi-square of a pose, three degrees of freedom, from which on it counts less."""
+
+
+def trust(chi2: Numbers, doubtful: float) -> Numbers:
+    """Weights (...,) of what disagrees by chi2 (...,), 1 up to where it becomes doubtful [(15)]; kernels compile it."""
+    weights: Numbers = np.minimum(1.0, 2 / (1 + chi2 / doubtful)) ** 2
+    return weights
+
+
+compiled_trust = inlined(trust)
