@@ -1,4 +1,4 @@
-"""The pictures in the documentation: `python docs/screenshots.py FOLDER [NAME ...]` takes them anew.
+"""The pictures in the documentation: `python docs/screenshots.py FOLDER [NAME ...]` takes them again.
 
 It starts a server of its own, brings it into each of twelve states, and looks at it with headless Chromium: on a desk
 (1400 x 900) in light and dark, and on a phone (390 x 844) in light.

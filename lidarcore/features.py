@@ -166,13 +166,15 @@ class Rejections(_View, Sequence[Rejection]):
         if isinstance(i, slice):
             return [self[k] for k in range(*i.indices(len(self)))]
         row = self._table[i]
-        value, limit = float(row[5]), float(row[6])
-        kind, reason, text = _REASONS[int(row[0])]
-        found = STATUS_MESSAGES.get(int(value), "") if row[0] == tables.DEGENERATE else ""
+        value, limit, why = float(row[tables.VALUE]), float(row[tables.LIMIT]), int(row[tables.REASON])
+        kind, reason, text = _REASONS[why]
+        found = STATUS_MESSAGES.get(int(value), "") if why == tables.DEGENERATE else ""
         message = text.format(
             value=value, limit=limit, found=found, angle=_degrees(value), least=_degrees(limit)
         )
-        return Rejection(kind, reason, message, int(row[1]), int(row[2]), row[3:5], value, limit)
+        first_beam, last_beam = row[tables.REJECTED_BEAMS : tables.REJECTED_BEAMS + 2].astype(int).tolist()
+        xy = row[tables.REJECTED_XY : tables.REJECTED_XY + 2]
+        return Rejection(kind, reason, message, first_beam, last_beam, xy, value, limit)
 
 
 def _degrees(sine: float) -> float:

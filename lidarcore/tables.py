@@ -23,7 +23,8 @@ FIELDS = LINE_FIELDS + 10
 CORNER_PUBLISHED, CORNER_CONSISTENT, CORNER_MAP, CORNER_FIELDS = 2, 6, 10, 14
 SEGMENTS, SINE = CORNER_FIELDS, CORNER_FIELDS + 2
 
-# A rejection: reason, first and last beam, x, y, the value found, the limit it missed.
+# A rejection: why, first and last beam, x, y, the value found, the limit it missed.
+REASON, REJECTED_BEAMS, REJECTED_XY, VALUE, LIMIT = 0, 1, 3, 5, 6
 TOO_FEW_POINTS, TOO_SHORT, DEGENERATE, TOO_FLAT, TOO_FAR = range(5)
 
 
@@ -39,4 +40,6 @@ def reject(
     limit: float,
 ) -> None:
     """Write one rejection."""
-    row[0], row[1], row[2], row[3], row[4], row[5], row[6] = reason, first_beam, last_beam, x, y, value, limit
+    row[REASON], row[VALUE], row[LIMIT] = reason, value, limit
+    row[REJECTED_BEAMS], row[REJECTED_BEAMS + 1] = first_beam, last_beam
+    row[REJECTED_XY], row[REJECTED_XY + 1] = x, y

@@ -12,6 +12,7 @@ from lidarcore.scan import Scan
 
 _LEAST = 3  # points that make a line
 _BEAMS = 2.2  # a line reaches at least this many beams' spacing to either side
+_MEAN, _NORMAL, _VARIANCE, _TILT, _COUNT, _FIELDS = 0, 2, 4, 5, 6, 7  # of a table of patches
 
 
 class Patches(NamedTuple):
@@ -42,18 +43,17 @@ def patches(scan: Scan, settings: MatchSettings) -> Patches:
     spacing = float(np.median(np.diff(bearings)))
     reaches = np.clip(_BEAMS * spacing * ranges, settings.radius, 4 * settings.radius)
     noise = np.array([settings.noise.sigma_range, settings.noise.sigma_bearing]) ** 2
-    lines = np.empty((len(points), 5))
-    _fit_lines(points, ranges, reaches, settings.gap, noise, lines)
-    table = np.empty((len(points), 7))
-    number = _gather(points, lines, settings.patch, settings.gap, table)
-    rows = table[:number]
-    variances = rows[:, 4] + settings.unevenness**2
-    return Patches(rows[:, :2].copy(), rows[:, 2:4].copy(), variances, rows[:, 5].copy(), rows[:, 6].copy())
+    single, table = np.empty((2, len(points), _FIELDS))
+    _fit_lines(points, ranges, reaches, settings.gap, noise, single)
+    rows = table[: _gather(single, settings.patch, table)]
+    variances = rows[:, _VARIANCE] + settings.unevenness**2
+    means, normals = (rows[:, column : column + 2].copy() for column in (_MEAN, _NORMAL))
+    return Patches(means, normals, variances, rows[:, _TILT].copy(), rows[:, _COUNT].copy())
 
 
 @kernel
-def _fit_lines(points: Array, ranges: Array, reaches: Array, gap: float, noise: Array, lines: Array) -> None:
-    """Normal, variance of the point along it, and of the normal's direction; number of points (N, 5)."""
+def _fit_lines(points: Array, ranges: Array, reaches: Array, gap: float, noise: Array, single: Array) -> None:
+    """Each point as a patch of its own: on the line of its neighbours, which it counts."""
     N = len(points)
     for i in range(N):
         px, py = points[i]
@@ -77,9 +77,10 @@ def _fit_lines(points: Array, ranges: Array, reaches: Array, gap: float, noise: 
         across = (nx * px + ny * py) / ranges[i]
         variance = noise[0] * across**2 + noise[1] * ranges[i] ** 2 * (1 - across**2)
         variance = max(variance, max(half - root, 0.0) * count / max(count - 2, 1))
-        lines[i, 0], lines[i, 1], lines[i, 2] = nx, ny, variance
-        lines[i, 3] = variance / max(count * (half + root), 1e-9)
-        lines[i, 4] = count
+        row = single[i]
+        row[_MEAN], row[_MEAN + 1], row[_NORMAL], row[_NORMAL + 1] = px, py, nx, ny
+        row[_VARIANCE], row[_TILT] = variance, variance / max(count * (half + root), 1e-9)
+        row[_COUNT] = count
 
 
 @kernel
@@ -108,28 +109,26 @@ def _neighbours(points: Array, i: int, reach: float, gap: float) -> tuple[int, i
 
 
 @kernel
-def _gather(points: Array, lines: Array, size: float, gap: float, table: Array) -> int:
+def _gather(single: Array, size: float, table: Array) -> int:
     """Neighbouring points up to `size` m apart that lie on one line, together; returns the number of rows."""
     number, n = 0, 0
     sx = sy = 0.0
-    for i in range(len(points)):
-        if lines[i, 4] < _LEAST:
+    for i in range(len(single)):
+        one = single[i]
+        if one[_COUNT] < _LEAST:
             continue
+        x, y, nx, ny = one[_MEAN], one[_MEAN + 1], one[_NORMAL], one[_NORMAL + 1]
         if n > 0:
-            far = (points[i, 0] - sx) ** 2 + (points[i, 1] - sy) ** 2 > size * size
-            bent = table[number, 2] * lines[i, 0] + table[number, 3] * lines[i, 1] < 0.9 * n
+            far = (x - sx) ** 2 + (y - sy) ** 2 > size * size
+            bent = table[number, _NORMAL] * nx + table[number, _NORMAL + 1] * ny < 0.9 * n
             if far or bent:
                 _close(table[number], n)
                 number, n = number + 1, 0
         if n == 0:
-            sx, sy = points[i]
+            sx, sy = x, y
             table[number] = 0.0
-        table[number, 0] += points[i, 0]
-        table[number, 1] += points[i, 1]
-        table[number, 2] += lines[i, 0]
-        table[number, 3] += lines[i, 1]
-        table[number, 4] += lines[i, 2]
-        table[number, 5] += lines[i, 3]
+        for column in range(_COUNT):
+            table[number, column] += one[column]
         n += 1
     if n > 0:
         _close(table[number], n)
@@ -140,6 +139,8 @@ def _gather(points: Array, lines: Array, size: float, gap: float, table: Array) 
 @kernel
 def _close(row: Array, n: int) -> None:
     """Sums into means; the variance of the mean falls with the number of points, that of the tilt does not."""
-    norm = np.hypot(row[2], row[3])
-    row[0], row[1], row[2], row[3] = row[0] / n, row[1] / n, row[2] / norm, row[3] / norm
-    row[4], row[5], row[6] = row[4] / n / n, row[5] / n, n
+    norm = np.hypot(row[_NORMAL], row[_NORMAL + 1])
+    for axis in range(2):
+        row[_MEAN + axis] /= n
+        row[_NORMAL + axis] /= norm
+    row[_VARIANCE], row[_TILT], row[_COUNT] = row[_VARIANCE] / n / n, row[_TILT] / n, n

@@ -46,13 +46,15 @@ def surfels(scans: Sequence[Patches], poses: Array, size: float, cell: float) ->
     key = cells(means, normals, size, _GAP)
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    columns = np.column_stack([weights[:, None] * np.hstack([means, normals, tilts[:, None]]), weights])
-    sums = np.add.reduceat(columns[order], starts) if len(starts) else np.empty((0, 6))
     number = np.diff(starts, append=len(order))
-    total = sums[:, 5]
-    mean, tilt = sums[:, :2] / total[:, None], sums[:, 4] / total / number
-    length = np.hypot(sums[:, 2], sums[:, 3])
-    return _sorted(mean, sums[:, 2:4] / length[:, None], 1 / total, tilt, cell)
+
+    def of_cells(values: Array) -> Array:
+        return np.add.reduceat(values[order], starts) if len(starts) else values
+
+    total, tilt = of_cells(weights), of_cells(weights * tilts)
+    mean, normal = (of_cells(weights[:, None] * v) for v in (means, normals))
+    length = np.hypot(*normal.T)
+    return _sorted(mean / total[:, None], normal / length[:, None], 1 / total, tilt / total / number, cell)
 
 
 def _sorted(means: Array, normals: Array, variances: Array, tilts: Array, cell: float) -> Surfels:

@@ -37,7 +37,7 @@ class Recording(ABC):
 
     Iterating raises RecordingError if the file holds no scan or turns out hostile. What can be saved of a
     damaged or truncated file is yielded, and `notes` say so. Iterate in one place at a time: an iteration
-    starts the counts in `notes` anew.
+    starts the counts in `notes` again.
 
     A format is a module of this package with a concrete subclass: `name`, `signature`, `_open`, `_scans`.
     """

@@ -25,10 +25,7 @@ def for_pieces(noise: NoiseModel, seen: float) -> NoiseModel:
     Told too little noise, walls would fall apart. Who gives the unevenness of walls has measured both.
     """
     v_rho = noise.v_rho if noise.v_wall > 0 else max(noise.v_rho, seen * seen)
-    return NoiseModel(
-        v_rho, noise.v_theta, noise.growth, noise.v_wall, noise.length, noise.renewal,
-        noise.resampling, noise.v_systematic, noise.tails, noise.widened, noise.latent,
-    )  # fmt: skip
+    return NoiseModel(v_rho, *noise[1:])  # v_rho is the first; numba knows no _replace
 
 
 @kernel

@@ -26,9 +26,9 @@ _FOLLOW = 0.1  # of the way to a new observation that the known place of a featu
 
 
 class Repeatability:
-    """The last `window` scans of a sensor that stands still, by several methods; it begins anew when the sensor moves.
+    """The last `window` scans of a sensor that stands still, by several methods; it starts again when the sensor moves.
 
-    standing    it is known to stand still: nothing that changes makes the window begin anew
+    standing    it is known to stand still: nothing that changes makes the window start again
     Raises EvaluationError for a window too small to judge a feature in, or a method that does not exist.
     """
 
@@ -88,7 +88,7 @@ class Repeatability:
         return table
 
     def _watch(self) -> None:
-        """Begin anew if corners or walls say that the sensor moved."""
+        """Start again if corners or walls say that the sensor moved."""
         corners, walls, newest = self.corners.firsts(), self.walls.firsts(), len(self) - 1
         if moves(corners, newest) or moves(replace(walls, table=_feet(walls.table)), newest):
             self.clear()
@@ -98,7 +98,7 @@ class Repeatability:
 
     @property
     def moved(self) -> bool:
-        """Whether the sensor moved and the window, which then began anew, is not full again."""
+        """Whether the sensor moved and the window, which then started again, is not full again."""
         return self._moved
 
     def summary(self) -> Summary:

@@ -48,6 +48,9 @@ def find_intersections(parts: list[Part], settings: WallSettings) -> Intersectio
             gap = np.where(meets, np.abs(t - spans[i, side]), np.inf)
             j = int(np.argmin(gap))
             if gap[j] <= min(settings.corner_gap, _SHARE * part.length):
-                found.append((i, j, side, *xy[j]))
-    table = np.array(found, np.float64).reshape(-1, 5)
-    return Intersections(table[:, :2].astype(np.int64), table[:, 2].astype(np.int64), table[:, 3:])
+                found.append(((i, j), side, xy[j]))
+    return Intersections(
+        np.array([walls for walls, _, _ in found], np.int64).reshape(-1, 2),
+        np.array([side for _, side, _ in found], np.int64),
+        np.array([at for _, _, at in found], np.float64).reshape(-1, 2),
+    )
