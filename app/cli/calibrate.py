@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from lidarcore import SensorNoise
-    from lidarcore.evaluation.calibration.calibrate import Calibration
+    from lidarcore.evaluation.calibration.result import Calibration
     from lidarcore.evaluation.intervals import Interval
 
     from ..jobs.calibration_report import BandsReport, CalibrationReport

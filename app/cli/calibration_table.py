@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
-from lidarcore.evaluation.calibration.calibrate import PRECISE
 from lidarcore.evaluation.calibration.design import PARTS, WITHOUT
+from lidarcore.evaluation.calibration.result import PRECISE
 from lidarcore.evaluation.calibration.study import CalibrationStudy, Cell, Part
 from lidarcore.evaluation.consistency.figures import HONEST
 from lidarcore.evaluation.intervals import Interval

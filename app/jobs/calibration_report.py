@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from lidarcore.evaluation.calibration.calibrate import Calibration
+from lidarcore.evaluation.calibration.result import Calibration
 from lidarcore.evaluation.calibration.variances import Bands
 from lidarcore.evaluation.intervals import Interval
 

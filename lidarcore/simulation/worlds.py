@@ -7,6 +7,7 @@ import numpy as np
 
 from lidarcore.errors import SimulationError
 from lidarcore.scan import Array
+from lidarcore.simulation.office import LENGTH, MIDDLE, WIDTH, office
 from lidarcore.simulation.paths import ROUND, Path, standing, wandering
 from lidarcore.simulation.posts import Posts, scattered
 from lidarcore.simulation.rooms import box, furnished_room, polygon, rectangular_room
@@ -105,6 +106,15 @@ def _field() -> Place:
     return hall(posts, paths)
 
 
+def _office() -> Place:
+    """Round: three quarters of the corridors, and through the large room."""
+    right, top, x, y = LENGTH - MIDDLE, WIDTH - MIDDLE, LENGTH / 2, WIDTH / 2
+    round_ = (
+        (15, MIDDLE), (right, MIDDLE), (right, top), (x, top), (x, y), (MIDDLE, y), (MIDDLE, MIDDLE),
+    )  # fmt: skip
+    return Place("office", "Office of 2,000 m²", office(), {"round": drive_round(round_, rounding=2.4)})
+
+
 WORLDS: dict[str, Place] = {
-    world.name: world for world in (_furnished(), _two_rooms(), _corridor(), _field())
+    world.name: world for world in (_furnished(), _two_rooms(), _corridor(), _office(), _field())
 }

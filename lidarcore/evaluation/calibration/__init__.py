@@ -3,4 +3,4 @@
 What is public are these modules; each is imported on demand.
 """
 
-__all__ = ["calibrate", "design", "noise_check", "study", "tables", "variances"]
+__all__ = ["calibrate", "design", "noise_check", "result", "study", "tables", "variances"]

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.calibration.calibrate import Calibration, calibrate
+from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.calibration.design import PARTS, Design
+from lidarcore.evaluation.calibration.result import Calibration
 from lidarcore.evaluation.calibration.true_walls import held
 from lidarcore.evaluation.consistency.design import KINDS, room
 from lidarcore.evaluation.intervals import Interval

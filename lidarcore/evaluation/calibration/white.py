@@ -23,6 +23,9 @@ _MOST_STEPPED = 0.2  # of the bins
 _TELLING = 10.0  # of log-likelihood that heavier tails have to gain
 _AROUND = 4  # neighbours on each side whose median a beam is held against
 
+White = tuple[Interval, Interval, Interval]
+"""sigma_range (m), range_growth (1/m) and sigma_bearing (rad)."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scatter:
@@ -59,7 +62,7 @@ def white_scatter(beams: WallBeams) -> Scatter:
     return Scatter(v[enough] / 2, _DOF * n[enough], lever2, ranges, range4, incidence)
 
 
-def white_parts(scatter: Scatter) -> tuple[Interval, Interval, Interval]:
+def white_parts(scatter: Scatter) -> White:
     """sigma_range (m), range_growth (1/m) and sigma_bearing (rad).
 
     What cannot be told from none is left out of the fit of the others, the growth first: its interval ends where it
