@@ -12,6 +12,7 @@ import typer
 
 from .agreement import agreement
 from .calibration_study import calibration
+from .endurance import endurance
 from .evaluate_map import evaluate_map
 from .honesty import honesty
 from .map_studies import relocation, walls
@@ -182,6 +183,7 @@ evaluate.command()(calibration)
 evaluate.command()(stations)
 evaluate.command()(agreement)
 evaluate.command()(honesty)
+evaluate.command()(endurance)
 evaluate.command()(relocation)
 evaluate.command()(walls)
 

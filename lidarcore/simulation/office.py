@@ -36,10 +36,10 @@ def _rooms() -> Iterable[Array]:
         for x in _COLUMNS[1:-1]:
             yield from _wall((x, y), (x, to))
     beside = (_ROWS[:-1] + np.diff(_ROWS) / 2 - _DEPTH).tolist()
-    for x, to in ((_DEPTH, 0.0), (LENGTH - _DEPTH, LENGTH)):
-        yield from _wall((x, _DEPTH), (x, WIDTH - _DEPTH), beside, _DOOR)
-        for y in _ROWS[1:-1]:
-            yield from _wall((x, y), (to, y))
+    for at, to in ((_DEPTH, 0.0), (LENGTH - _DEPTH, LENGTH)):
+        yield from _wall((at, _DEPTH), (at, WIDTH - _DEPTH), beside, _DOOR)
+        for row in _ROWS[1:-1]:
+            yield from _wall((at, row), (to, row))
 
 
 def _large_room() -> Iterable[Array]:
@@ -50,8 +50,8 @@ def _large_room() -> Iterable[Array]:
         yield from _wall(start, end, [float(np.hypot(*np.subtract(end, start))) / 2], _WIDE_DOOR)
     for k, (x, y) in enumerate(_DESKS):
         yield box(x, y, 1.6, 0.8, 0.15 * (k % 5 - 2))
-    for x, y in _PILLARS:
-        yield box(x, y, 0.5, 0.5, 0)
+    for at in _PILLARS:
+        yield box(*at, 0.5, 0.5, 0)
 
 
 def _wall(

@@ -1,6 +1,7 @@
 """People who walk about a room: what a lidar at the height of their shins sees are two legs each."""
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from lidarcore.errors import SimulationError
 from lidarcore.scan import Array
@@ -28,7 +29,7 @@ class Person:
     """
 
     def __init__(self, world: World, rng: np.random.Generator, avoid: Array) -> None:
-        self._world, self._rng, self._avoid = world, rng, avoid
+        self._world, self._rng, self._avoid = world, rng, KDTree(avoid)
         spot = self._next_spot(None)
         # The route: when it bends (s), where (x, y m), how far it was (m), and the direction from there on.
         self._route = np.array([[0.0, *spot, 0.0, 1.0, 0.0]])
@@ -65,10 +66,15 @@ class Person:
         raise SimulationError("Nobody can walk here: walls and the sensor's path leave too little room.")
 
     def _is_clear(self, start: Array, end: Array) -> bool:
-        steps = int(np.hypot(*(end - start)) / 0.1) + 1
+        x, y = end - start
+        free, _ = self._world.cast(np.append(start, 0.0), np.arctan2([y], [x]))
+        if free[0] < np.hypot(x, y):  # most spots of a large building lie behind walls
+            return False
+        steps = int(np.hypot(x, y) / 0.1) + 1
         way = start + np.linspace(0, 1, steps + 1)[:, None] * (end - start)
-        from_sensor = np.linalg.norm(way[:, None] - self._avoid, axis=-1)
-        return bool(from_sensor.min() >= _SENSOR) and all(self._world.clearance(*at) >= _WALL for at in way)
+        return bool(self._avoid.query(way)[0].min() >= _SENSOR) and all(
+            self._world.clearance(*at) >= _WALL for at in way
+        )
 
 
 def distances_to_legs(legs: Array, positions: Array, directions: Array) -> Array:

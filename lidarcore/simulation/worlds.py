@@ -107,10 +107,10 @@ def _field() -> Place:
 
 
 def _office() -> Place:
-    """Round: three quarters of the corridors, and through the large room."""
+    """Out of the large room, through three quarters of the corridors, and back."""
     right, top, x, y = LENGTH - MIDDLE, WIDTH - MIDDLE, LENGTH / 2, WIDTH / 2
     round_ = (
-        (15, MIDDLE), (right, MIDDLE), (right, top), (x, top), (x, y), (MIDDLE, y), (MIDDLE, MIDDLE),
+        (x - 5, y), (MIDDLE, y), (MIDDLE, MIDDLE), (right, MIDDLE), (right, top), (x, top), (x, y),
     )  # fmt: skip
     return Place("office", "Office of 2,000 m²", office(), {"round": drive_round(round_, rounding=2.4)})
 

@@ -22,7 +22,7 @@ const WHENCE = {
 const STEPS = [
   ["Compare methods", "Which method's ellipse is true? Shows all methods on one corner, with the ellipses their papers publish", compare],
   ["Calibrate my sensor", "Measures the noise of this sensor, so that its ellipses are true. It has to stand still meanwhile", calibrate],
-  ["Build a map", "A simulated robot drives through rooms with doors, and the map grows", buildMap],
+  ["Build a map", "A simulated robot drives through an office where people walk, and the map grows", buildMap],
 ];
 
 export function mountWelcome() {
@@ -84,6 +84,6 @@ function calibrate() {
 
 async function buildMap() {
   showPanel("map");
-  if (!(await open({ kind: "simulation", settings: { world: "two rooms" } }))) return;
+  if (!(await open({ kind: "simulation", settings: { world: "office", people: 4 } }))) return;
   await settings.patch({ navigation: { mode: "slam", method: "scans" } });
 }

@@ -85,11 +85,11 @@ def as_geojson(geometry, **changes):
     [
         ("json", "", "cannot be read"),
         ("json", "[" * 100_000, "cannot be read"),
-        ("json", "[]", "no object with landmarks"),
+        ("json", "[]", "no object with the key landmarks"),
         ("json", json.dumps({"landmarks": [GOOD]}), "'unit': None"),
         ("json", json.dumps(HEAD | {"unit": "mm", "landmarks": [GOOD]}), "'unit': 'mm'"),
         ("json", json.dumps(HEAD | {"version": 2, "landmarks": [GOOD]}), "'version': 2"),
-        ("json", json.dumps(HEAD | {"landmarks": {"a": 1}}), "no list of objects"),
+        ("json", json.dumps(HEAD | {"landmarks": {"a": 1}}), "not a list of objects"),
         ("json", as_json(x=float("nan")), "Landmark 2: .*finite"),
         ("json", as_json(x=None), "Landmark 2: .*number"),
         ("json", as_json(var_x=-1), "Landmark 2: .*positive definite"),

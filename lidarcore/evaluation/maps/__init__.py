@@ -3,4 +3,4 @@
 What is public are these modules; each is imported on demand.
 """
 
-__all__ = ["accuracy", "honesty", "relocation", "study", "walls"]
+__all__ = ["accuracy", "endurance", "honesty", "relocation", "study", "walls"]
