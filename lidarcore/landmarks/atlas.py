@@ -8,7 +8,8 @@ from typing import Any
 from lidarcore.errors import UnknownLandmarkError, UnknownSessionError
 from lidarcore.landmarks.database import PATIENCE, Database, path_of
 from lidarcore.landmarks.landmark import Landmark
-from lidarcore.landmarks.landmark_map import LandmarkMap, purge
+from lidarcore.landmarks.landmark_map import LandmarkMap
+from lidarcore.landmarks.landmark_store import forget_landmarks, store_landmarks
 from lidarcore.landmarks.queries import check_finite
 from lidarcore.landmarks.wall_store import forget_walls
 
@@ -71,9 +72,8 @@ class Atlas:
         with self._database.writing() as connection:
             query = "INSERT INTO sessions (source, mode, started) VALUES (?, ?, ?) RETURNING id"
             (session,) = connection.execute(query, (source, mode, started)).fetchone()
-            landmark_map = LandmarkMap(self._database, session)
-            landmark_map.store(connection, landmarks)
-        return landmark_map
+            store_landmarks(connection, session, landmarks)
+        return LandmarkMap(self._database, session)
 
     def end(self, session: int, ended: float) -> None:
         """Note that a session has ended, at its start if the clock was set back since. Raises UnknownSessionError."""
@@ -147,7 +147,7 @@ class Atlas:
             )
             gone = [row[0] for row in left]
         for id in gone:
-            purge(self._database, id)
+            forget_landmarks(self._database, id)
             forget_walls(self._database, id)
 
 

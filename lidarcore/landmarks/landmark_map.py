@@ -3,14 +3,20 @@
 import math
 import sqlite3
 from collections.abc import Iterable, Iterator
-from dataclasses import astuple, fields
 from typing import get_args
 
 from numpy.typing import ArrayLike
 
-from lidarcore.errors import LandmarkError, UnknownLandmarkError, UnknownSessionError, UnknownWallError
-from lidarcore.landmarks.database import AT_ONCE, Database
-from lidarcore.landmarks.landmark import COLUMNS, Landmark, as_covariance, as_position
+from lidarcore.errors import LandmarkError, UnknownSessionError, UnknownWallError
+from lidarcore.landmarks.database import Database
+from lidarcore.landmarks.landmark import Landmark, as_covariance, as_position
+from lidarcore.landmarks.landmark_store import (
+    forget_landmarks,
+    landmark_history,
+    remove_landmark,
+    store_landmarks,
+    unknown_landmark,
+)
 from lidarcore.landmarks.nearest import Metric, Neighbour, Neighbourhood
 from lidarcore.landmarks.queries import (
     SELECTED,
@@ -23,31 +29,11 @@ from lidarcore.landmarks.queries import (
     check_order,
     find,
 )
-from lidarcore.landmarks.stored_grid import StoredGrid
+from lidarcore.landmarks.stored_grid import StoredGrid, grid_of, replace_grid
 from lidarcore.landmarks.wall import StoredWall
 from lidarcore.landmarks.wall_store import replace_walls, wall_history, walls_of
 
 _ALL = Filter()
-_STATE = ", ".join(COLUMNS[:-1])  # all but the id
-_VALUES = ", ".join(f":{name}" for name in COLUMNS[:-1])
-_INSERT = f"INSERT INTO landmarks ({_STATE}, id, session, sigma) VALUES ({_VALUES}, NULL, :session, :sigma)"
-_UPDATE = (
-    f"UPDATE landmarks SET ({_STATE}, sigma) = ({_VALUES}, :sigma) WHERE id = :id AND session = :session"
-)
-_GRID = ", ".join(one.name for one in fields(StoredGrid))
-_PLACE = "INSERT OR REPLACE INTO places VALUES (:id, :x, :x, :y, :y, 0, :sigma, :session, :session + 0.5)"
-_REMEMBER = (
-    f"INSERT OR REPLACE INTO history ({_STATE}, landmark, second, session) "
-    f"VALUES ({_VALUES}, :id, :second, :session)"
-)
-_WIDEN = (
-    "INSERT INTO extents VALUES (:session, :x, :x, :y, :y, :sigma, :sigma) ON CONFLICT DO UPDATE SET "
-    + ", ".join(
-        f"{name}_{least} = {least}({name}_{least}, :{name})"
-        for name in ("x", "y", "sigma")
-        for least in ("min", "max")
-    )
-)
 _IN_SESSION = f"SELECT {SELECTED} FROM landmarks WHERE session = :session"
 
 
@@ -79,7 +65,7 @@ class LandmarkMap:
             query, parameters = f"{_IN_SESSION} AND id = :id", {"session": self.session, "id": id}
             if row := connection.execute(query, parameters).fetchone():
                 return Landmark(*row)
-        raise self._unknown(id)
+        raise unknown_landmark(self.session, id)
 
     def put(self, landmarks: Iterable[Landmark], without: Iterable[int] = ()) -> list[int]:
         """Store new landmarks (id None) and new states of known ones, and take out those `without`; the ids stored.
@@ -90,8 +76,8 @@ class LandmarkMap:
         with self._database.writing() as connection:
             self._check(connection)
             for id in without:
-                self._remove(connection, id)
-            return self.store(connection, landmarks)
+                remove_landmark(connection, self.session, id)
+            return store_landmarks(connection, self.session, landmarks)
 
     def put_walls(self, walls: Iterable[StoredWall], grid: StoredGrid | None = None) -> None:
         """Store walls, and the grid of the same moment, in place of those that the map has: all or nothing.
@@ -102,7 +88,7 @@ class LandmarkMap:
             self._check(connection)
             replace_walls(connection, self.session, walls)
             if grid is not None:
-                self._replace_grid(connection, grid)
+                replace_grid(connection, self.session, grid)
 
     def walls(self) -> list[StoredWall]:
         """All walls in the order of their ids."""
@@ -126,43 +112,16 @@ class LandmarkMap:
         """Store an occupancy grid in place of that which the map has. Raises UnknownSessionError if it was deleted."""
         with self._database.writing() as connection:
             self._check(connection)
-            self._replace_grid(connection, grid)
-
-    def _replace_grid(self, connection: sqlite3.Connection, grid: StoredGrid) -> None:
-        query = f"INSERT OR REPLACE INTO grids (session, {_GRID}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
-        connection.execute(query, (self.session, *astuple(grid)))
+            replace_grid(connection, self.session, grid)
 
     def grid(self) -> StoredGrid | None:
         """The occupancy grid, if there is one."""
-        query = f"SELECT {_GRID} FROM grids WHERE session = ?"
         with self._database.reading() as connection:
-            row = connection.execute(query, (self.session,)).fetchone()
-        return None if row is None else StoredGrid(*row)
+            return grid_of(connection, self.session)
 
     def _check(self, connection: sqlite3.Connection) -> None:
         if not connection.execute("SELECT 1 FROM sessions WHERE id = ?", (self.session,)).fetchone():
             raise UnknownSessionError(f"Session {self.session} was deleted: begin another one.")
-
-    def store(self, connection: sqlite3.Connection, landmarks: Iterable[Landmark]) -> list[int]:
-        """What `put` does, within a transaction."""
-        return [self._store(connection, landmark) for landmark in landmarks]
-
-    def _store(self, connection: sqlite3.Connection, landmark: Landmark) -> int:
-        values = {name: getattr(landmark, name) for name in COLUMNS} | {"session": self.session}
-        values |= {"sigma": landmark.sigma, "second": math.floor(landmark.last_seen)}
-        if landmark.id is None:
-            values["id"] = connection.execute(_INSERT, values).lastrowid
-        elif not connection.execute(_UPDATE, values).rowcount:
-            raise self._unknown(landmark.id)
-        for statement in (_PLACE, _WIDEN, _REMEMBER):
-            connection.execute(statement, values)
-        return int(values["id"])
-
-    def _remove(self, connection: sqlite3.Connection, id: int) -> None:
-        query = "DELETE FROM landmarks WHERE id = ? AND session = ?"
-        if not connection.execute(query, (id, self.session)).rowcount:
-            raise self._unknown(id)
-        connection.execute("DELETE FROM places WHERE id = ?", (id,))
 
     def remove(self, ids: Iterable[int]) -> None:
         """Take landmarks out, all or none; their history stays. Raises UnknownLandmarkError."""
@@ -170,7 +129,7 @@ class LandmarkMap:
 
     def clear(self) -> None:
         """Give up all landmarks and their history, bit by bit, so that others who write need not wait."""
-        purge(self._database, self.session)
+        forget_landmarks(self._database, self.session)
 
     def find(
         self, region: Box | Circle | None = None, which: Filter = _ALL, after: int = 0, limit: int = 1000
@@ -219,13 +178,8 @@ class LandmarkMap:
         """
         check_limit("limit", limit)
         check_order("-inf", -math.inf, "after", after)
-        of_it, parameters = "FROM history WHERE landmark = ? AND session = ?", (id, self.session)
-        query = f"SELECT {_STATE}, landmark {of_it} AND last_seen > ? ORDER BY second LIMIT ?"
         with self._database.reading() as connection:
-            if not connection.execute(f"SELECT 1 {of_it}", parameters).fetchone():
-                raise self._unknown(id)
-            rows = connection.execute(query, (*parameters, after, limit)).fetchall()
-        return [Landmark(*row) for row in rows]
+            return landmark_history(connection, self.session, id, after, limit)
 
     def extent(self) -> Box | None:
         """The smallest box around all landmarks, m; None for an empty map. Reads the whole map."""
@@ -233,27 +187,3 @@ class LandmarkMap:
         with self._database.reading() as connection:
             bounds = connection.execute(query, (self.session,)).fetchone()
         return None if bounds[0] is None else Box(*bounds)
-
-    def _unknown(self, id: int) -> UnknownLandmarkError:
-        return UnknownLandmarkError(f"Session {self.session} holds no landmark {id}.")
-
-
-def purge(database: Database, session: int) -> None:
-    """Delete all landmarks of a session and their history in transactions that are each short."""
-    while not _purge_some(database, session):
-        pass
-
-
-def _purge_some(database: Database, session: int) -> bool:
-    """True if nothing was left."""
-    some = f"WHERE session = {session} LIMIT {AT_ONCE}"
-    with database.writing() as connection:
-        connection.execute(f"DELETE FROM places WHERE id IN (SELECT id FROM landmarks {some})")
-        landmarks = connection.execute(f"DELETE FROM landmarks WHERE id IN (SELECT id FROM landmarks {some})")
-        states = connection.execute(
-            f"DELETE FROM history WHERE (landmark, second) IN (SELECT landmark, second FROM history {some})"
-        )
-        if max(landmarks.rowcount, states.rowcount) == AT_ONCE:
-            return False
-        connection.execute("DELETE FROM extents WHERE session = ?", (session,))
-        return True

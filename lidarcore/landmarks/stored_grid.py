@@ -1,6 +1,7 @@
 """An occupancy grid as the file of maps keeps it."""
 
-from dataclasses import dataclass
+import sqlite3
+from dataclasses import astuple, dataclass, fields
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,3 +21,18 @@ class StoredGrid:
     rows: int
     columns: int
     cells: bytes
+
+
+_COLUMNS = ", ".join(one.name for one in fields(StoredGrid))
+
+
+def replace_grid(connection: sqlite3.Connection, session: int, grid: StoredGrid) -> None:
+    """Store the grid of a session in place of that which it has."""
+    query = f"INSERT OR REPLACE INTO grids (session, {_COLUMNS}) VALUES (?, ?, ?, ?, ?, ?, ?, ?)"
+    connection.execute(query, (session, *astuple(grid)))
+
+
+def grid_of(connection: sqlite3.Connection, session: int) -> StoredGrid | None:
+    """The grid of a session, if it has one."""
+    row = connection.execute(f"SELECT {_COLUMNS} FROM grids WHERE session = ?", (session,)).fetchone()
+    return None if row is None else StoredGrid(*row)
