@@ -22,7 +22,8 @@ from lidarcore.geometry import (
     squared_mahalanobis,
     wrap,
 )
-from lidarcore.mapping.adjustment import Groups, NormalEquations, Observations, normal_equations
+from lidarcore.mapping.adjustment import NormalEquations, normal_equations
+from lidarcore.mapping.adjustment_cells import Groups, Observations
 from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.patches import Patches
 

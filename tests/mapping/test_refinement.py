@@ -7,7 +7,8 @@ from scipy.stats import chi2
 
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
-from lidarcore.mapping.adjustment import Observations, normal_equations
+from lidarcore.mapping.adjustment import normal_equations
+from lidarcore.mapping.adjustment_cells import Observations
 from lidarcore.mapping.patches import patches
 from lidarcore.mapping.refinement import Step, refine
 from lidarcore.simulation import World, furnished_room
