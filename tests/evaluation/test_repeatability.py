@@ -18,7 +18,8 @@ from lidarcore import ExtractionSettings, Features, Scan, SensorNoise, compare, 
 from lidarcore import tables as columns
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.evaluation.repeatability.scatter import OBSERVATION, Observations, scatter
+from lidarcore.evaluation.repeatability.observations import OBSERVATION, Observations
+from lidarcore.evaluation.repeatability.scatter import scatter
 from lidarcore.evaluation.repeatability.statistics import Repeatability
 from lidarcore.evaluation.repeatability.summary import Judgement, verdict
 from lidarcore.evaluation.repeatability.tables import to_csv, to_json

@@ -13,47 +13,16 @@ from scipy.special import chdtri
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.consistency.figures import GATES
 from lidarcore.evaluation.intervals import LEVEL, intervals, shares, wilson
+from lidarcore.evaluation.repeatability.observations import Observations, covariances, root_det
 from lidarcore.evaluation.repeatability.summary import FeatureClaim, FeatureScatter, Judgement, Matrix
 from lidarcore.geometry import squared_mahalanobis_2d
 from lidarcore.scan import Array, Ints
 
 LEAST = 10
 """A corner or wall seen fewer times is not judged."""
-OBSERVATION = 10
-"""Numbers of an observation: x, y of a corner or alpha, r of a wall; published (4), consistent (4)."""
 
 Mask = NDArray[np.bool_]
 Item = TypeVar("Item")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Observations:
-    """R observations of features, all corners or all walls; for `scatter` sorted by feature and then by scan.
-
-    ids, scans (R,); table (R, M, OBSERVATION) for M methods, NaN where a method did not find the feature; (R, 2) of
-    one method.
-    """
-
-    ids: Ints
-    scans: Ints
-    table: Array
-
-    @property
-    def starts(self) -> Ints:
-        """(K,) where each feature begins."""
-        return np.flatnonzero(np.diff(self.ids, prepend=-1))
-
-    def without(self, n: int) -> "Observations":
-        """All but the first n observations."""
-        return Observations(self.ids[n:], self.scans[n:], self.table[n:])
-
-    def followed_by(self, other: "Observations") -> "Observations":
-        """These observations, then others."""
-        return Observations(
-            np.concatenate([self.ids, other.ids]),
-            np.concatenate([self.scans, other.scans]),
-            np.concatenate([self.table, other.table]),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +65,7 @@ class Scatter:
 
     @cached_property
     def _claimed(self) -> Array:
-        return _root_det(covariances(self.means))
+        return root_det(covariances(self.means))
 
     def features(self) -> list[tuple[FeatureScatter, ...]]:
         """The features that each method saw often enough, in the order of their ids."""
@@ -212,26 +181,11 @@ def _tally(nees: Array, judged: Mask, groups: Ints, n: int) -> Array:
     return np.cumsum(counts[..., :0:-1], -1).astype(np.float64)
 
 
-def one_sigma_areas(table: Array) -> Array:
-    """(..., 2) areas of the claimed one-sigma ellipses of observations (..., OBSERVATION), by KINDS."""
-    return np.pi * _root_det(covariances(table))
-
-
-def covariances(table: Array) -> Array:
-    """(..., 2, 4) claimed of observations (..., OBSERVATION), by KINDS."""
-    return table[..., 2:].reshape(*table.shape[:-1], len(KINDS), 4)
-
-
 def _area_ratios(claimed: Array, actual: Array, dof: Array) -> Array:
     """(3, ...) claimed over actual area and the ends of its interval; dof times actual over the truth is chi-square."""
     with np.errstate(divide="ignore", invalid="ignore"):  # what does not scatter at all
         over = claimed / actual
     return np.array([over, *(over * chdtri(dof, p) / dof for p in _TAILS)])
-
-
-def _root_det(c: Array) -> Array:
-    root: Array = np.sqrt(np.maximum(c[..., 0] * c[..., 3] - c[..., 1] * c[..., 2], 0.0))
-    return root
 
 
 def _squared_mahalanobis(x: Array, y: Array, c: Array) -> Array:

@@ -11,14 +11,8 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
-from lidarcore.evaluation.repeatability.scatter import (
-    LEAST,
-    OBSERVATION,
-    Observations,
-    Scatter,
-    one_sigma_areas,
-    scatter,
-)
+from lidarcore.evaluation.repeatability.observations import OBSERVATION, Observations, one_sigma_areas
+from lidarcore.evaluation.repeatability.scatter import LEAST, Scatter, scatter
 from lidarcore.evaluation.repeatability.summary import WHISKER, Box, Claim, FeatureScatter, verdict
 from lidarcore.evaluation.repeatability.wall_tracker import WallRow
 from lidarcore.tracking import CornerRow
