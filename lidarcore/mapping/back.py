@@ -8,7 +8,6 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.geometry import compose, pose_difference, relative
 from lidarcore.mapping.consistency import Loop
-from lidarcore.mapping.front import Tracked
 from lidarcore.mapping.islands import Islands, moved
 from lidarcore.mapping.keyframes import Keyframe
 from lidarcore.mapping.loops import LoopFinder
@@ -18,6 +17,7 @@ from lidarcore.mapping.refinement import Refined, Step, refine
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.sight import sight
 from lidarcore.mapping.sweep import without
+from lidarcore.mapping.tracked import Tracked
 
 _AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map
 _FOUND = np.diag([0.05, 0.05, 0.02]) ** 2  # how well it is known where an island was found

@@ -6,8 +6,8 @@ from typing import Literal, Protocol
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose
 from lidarcore.localization.tracking_result import State
-from lidarcore.mapping.front import Tracked
 from lidarcore.mapping.grid import OccupancyGrid
+from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import Walls
 
 END_WITHIN = 5.0  # s that a thread may take for what it is at

@@ -12,9 +12,9 @@ from lidarcore.geometry import UncertainPose
 from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.back import BackEnd
 from lidarcore.mapping.background import END_WITHIN, Corrected, MapPicture
-from lidarcore.mapping.front import Tracked
 from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
 from lidarcore.mapping.settings import VAGUE, MapperSettings
+from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import WallIds, Walls, find_walls
 from lidarcore.mapping.worker import Worker
 from lidarcore.settings import ExtractionSettings

@@ -9,12 +9,13 @@ from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, inverse, relative
 from lidarcore.mapping.back import BackEnd, Snapshot
 from lidarcore.mapping.consistency import Loop
-from lidarcore.mapping.front import FrontEnd, Tracked
+from lidarcore.mapping.front import FrontEnd
 from lidarcore.mapping.keyframes import Keyframes
 from lidarcore.mapping.motion_smoothing import ScanMotion, half_time, smoothed
 from lidarcore.mapping.pose_graph import PoseGraph
 from lidarcore.mapping.refinement import Refined
 from lidarcore.mapping.settings import MapperSettings
+from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.worker import Worker
 from lidarcore.scan import Scan
 

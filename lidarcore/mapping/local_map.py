@@ -1,0 +1,102 @@
+"""The surfaces of the last keyframes, and where a scan lies on them."""
+
+from collections import deque
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
+from lidarcore.mapping.correlative import search
+from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.registration import Registration, information_of, register
+from lidarcore.mapping.settings import FrontSettings
+from lidarcore.mapping.surfels import Surfels, surfels
+
+BLIND = 20  # patches: nothing can be registered on a scan that has fewer
+SURE = 0.6  # share of a scan on the map from which on it needs no search
+_FURTHER = 3.0  # times as far is looked for a scan that does not fit
+_TURNED = 0.25  # rad from which on two poses are not the same
+_WIDE = 0.5  # m by which a point may be off where the search is needed in any case
+_BETTER = 0.02  # share of a scan by which a pose that was searched for must fit better than that of the guess
+_RIVAL = 0.85  # of the share of a scan on the map, from which on another pose is a rival
+_RIVALS = 3  # other poses that are looked at
+
+
+class LocalMap:
+    """A map in a local frame, which loops never bend; guesses and ties are poses from the newest keyframe."""
+
+    def __init__(self, settings: FrontSettings) -> None:
+        self._settings = settings
+        self._window: deque[tuple[Patches, Array]] = deque(maxlen=settings.keyframes)
+        self._surfels: Surfels  # of the window
+        self._anchor = np.zeros(3)  # T_local_keyframe of the newest
+
+    def clear(self) -> None:
+        """Forget all keyframes, but not where the last one was."""
+        self._window.clear()
+
+    def add(self, seen: Patches, tie: Array | None = None) -> None:
+        """A keyframe at a pose (3,) from the one before it, or where that is: the map is made anew."""
+        if tie is not None:
+            self._anchor = compose(self._anchor, tie)
+        self._window.append((seen, self._anchor))
+        scans, poses = zip(*self._window, strict=True)
+        match = self._settings.match
+        self._surfels = surfels(scans, np.array(poses), match.patch, match.reach)
+
+    def registered(self, seen: Patches, guess: UncertainPose) -> Registration:
+        """The scan on the local map: from the guess on, and after a search where the guess is vague or does not fit."""
+        match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        prior = information_of(P)
+        sigma = np.sqrt(np.diagonal(P))
+        far = np.percentile(np.hypot(*seen.means.T), 80) if len(seen.means) else 0.0
+        registered = register(self._surfels, seen, x, x, prior, match.reach)
+        if registered.inliers < SURE or 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE:
+            registered = self._searched(seen, x, sigma, prior, registered)
+        if registered.inliers < SURE:
+            registered = self._searched(seen, x, _FURTHER * sigma, prior, registered)
+        return registered
+
+    def registered_again(self, seen: Patches, guess: UncertainPose, pose: Array) -> Registration:
+        """The scan on the local map, from a pose near the right one."""
+        x, P = UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        return register(self._surfels, seen, pose, x, information_of(P), self._settings.match.reach)
+
+    def _searched(
+        self, seen: Patches, x: Array, sigma: Array, prior: Array, registered: Registration
+    ) -> Registration:
+        """The better one of where the scan was registered and where a search finds it."""
+        match = self._settings.match
+        start = search(self._surfels.means, seen.means, x, sigma, match)
+        other = register(self._surfels, seen, start, x, prior, match.reach)
+        return other if other.inliers > registered.inliers + _BETTER else registered
+
+    def rival(self, seen: Patches, guess: UncertainPose, registered: Registration) -> Array | None:
+        """Another pose (3,) at which a scan that fits badly fits nearly as well, if the guess leaves it open."""
+        if not self._settings.inliers <= registered.inliers < SURE or len(seen.means) < BLIND:
+            return None
+        match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        sigma, prior, besides = np.sqrt(np.diagonal(P)), information_of(P), registered.pose[None]
+        if 3 * np.hypot(sigma[0], sigma[1]) < _WIDE:
+            return None
+        for _ in range(_RIVALS):
+            start = search(self._surfels.means, seen.means, x, sigma, match, besides)
+            other = register(self._surfels, seen, start, x, prior, match.reach)
+            off = pose_difference(registered.pose, other.pose)
+            if other.inliers >= _RIVAL * registered.inliers and (
+                np.hypot(*off[:2]) > _WIDE or abs(off[2]) > _TURNED
+            ):
+                return other.pose
+            besides = np.concatenate([besides, start[None]])
+        return None
+
+    def either(self, registered: Registration, rival: Array) -> UncertainPose:
+        """The pose seen from the keyframe, so uncertain that it may be the rival."""
+        pose, P = self.tie(registered)
+        off = pose_difference(relative(self._anchor, rival), pose)
+        return UncertainPose(pose, P + np.outer(off, off) + np.diag(off**2))
+
+    def tie(self, registered: Registration) -> UncertainPose:
+        """The pose seen from the keyframe."""
+        exact = UncertainPose(self._anchor, np.zeros((3, 3)))
+        return exact.relative(UncertainPose(registered.pose, information_of(registered.information)))
