@@ -226,7 +226,7 @@ def test_a_running_map_that_was_cleared_or_deleted_is_written_again_but_not_when
     store.begin("next").put(landmarks(1))
     assert told.next().landmarks
     assert [one.source for one in store.atlas.sessions()] == ["next"]
-    assert store.error is None
+    assert store.status.error is None
 
 
 @pytest.mark.long
@@ -242,8 +242,8 @@ def test_a_locked_file_is_reported_holds_up_nobody_and_catches_up(store: Landmar
     for n in range(3, 102):
         run.put(landmarks(n))
     assert time.monotonic() - begin < PATIENCE / 2  # else it waits as long as the file is locked
-    wait_until(lambda: store.error)
-    assert "locked" in store.error
+    wait_until(lambda: store.status.error)
+    assert "locked" in store.status.error
     run.put(landmarks(101))
     behind = time.monotonic() - first
     assert store.status.behind_s >= behind  # what waits longest counts, however often a newer map comes
@@ -251,7 +251,7 @@ def test_a_locked_file_is_reported_holds_up_nobody_and_catches_up(store: Landmar
     blocker.execute("ROLLBACK")
     assert len(told.next().landmarks) == 100
     assert len(store.map()) == 101
-    assert store.error is None
+    assert store.status.error is None
     assert not told.changes
 
 
@@ -269,14 +269,14 @@ limit = resource.getrlimit(resource.RLIMIT_FSIZE)
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, limit[1]))
 n = 0
-while store.error is None:
+while store.status.error is None:
     n += 100
     run.put(landmarks(n))
     time.sleep(0.05)
-print(store.error)
+print(store.status.error)
 resource.setrlimit(resource.RLIMIT_FSIZE, limit)
 store.close()
-print(n, store.error)
+print(n, store.status.error)
 """
     path = tmp_path / "landmarks.db"
     command = [sys.executable, "-c", script, str(path)]
