@@ -7,9 +7,10 @@ from lidarcore.localization.ekf.estimate import Estimate, as_pose
 from lidarcore.localization.ekf.localizer import Localizer
 from lidarcore.localization.ekf.slam import Slam
 from lidarcore.localization.landmarks import Landmarks, from_stored, to_stored
-from lidarcore.localization.navigator import Navigator, warm_up
+from lidarcore.localization.navigator import Navigator
 from lidarcore.localization.points import Points
 from lidarcore.localization.posts import find_posts
+from lidarcore.localization.precompile import warm_up
 from lidarcore.localization.relocalization import Relocation, relocalize
 from lidarcore.localization.settings import (
     LocalizationSettings,

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike
 
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError, LostError, MotionError
-from lidarcore.extraction import extract
 from lidarcore.features import Features
 from lidarcore.localization.continuity import Continuity
 from lidarcore.localization.dead_reckoning import DeadReckoning, Velocity
@@ -280,26 +279,3 @@ class Navigator:
     def _set_start(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         self._start = start(as_pose(pose, "pose"), covariance, LocalizationSettings(), 3)
         self._estimate = Estimate(0.0, *self._start, None, no_innovation(0))
-
-
-_SCANS, _PERIOD = 8, 0.5  # enough, and long enough, that landmarks are confirmed
-
-
-def warm_up() -> None:
-    """Compile every kernel, or load it from the cache: seconds the first time, so do it before the first scan."""
-    bearings = np.linspace(-np.pi, np.pi, 200, endpoint=False)
-    ranges = 1 / np.maximum(np.abs(np.cos(bearings)), np.abs(np.sin(bearings)))
-    square = Scan(ranges, bearings, beam_times=np.linspace(0, 0.1, 200))
-    for odometry in (None, np.zeros(3)):
-        built = _run(Navigator(NavigationSettings(mode="slam")), square, odometry)
-        _run(Navigator(NavigationSettings(mode="localize"), built.landmarks), square, odometry)
-    far = 100.0 + np.stack(np.meshgrid(np.arange(10.0), np.arange(20.0)), -1).reshape(-1, 2)
-    large = Points(far, 1e-4 * np.eye(2))
-    _run(Navigator(NavigationSettings(mode="slam"), large, np.zeros(3), 1e-6 * np.eye(3)), square, None)
-
-
-def _run(navigator: Navigator, scan: Scan, odometry: Array | None) -> Navigator:
-    for number in range(_SCANS):
-        here = navigator.deskewed(replace(scan, stamp=number * _PERIOD, odometry=odometry))
-        navigator.step(here, extract(here))
-    return navigator
