@@ -138,20 +138,21 @@ def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
     for state in states:
         run.put(GRID, walls(state))
         wait_until(lambda: run.session is not None and store.status.behind_s == 0)
-    told = server.get("/walls/4/history", limit=3)
+    kept = {"session": run.session}  # without, it is the map of what plays, which localizes nothing
+    told = server.get("/walls/4/history", limit=3, **kept)
     assert told["session"] == run.session
     assert told["wall"] == server.get("/walls", session=run.session)["walls"][0]
     assert [wall["length"] for wall in told["history"]] == [1.0, 2.0, 3.0]
     assert told["history"][0]["covariance"] == [[1e-6, 1e-7], [1e-7, 1e-5]]
-    rest = server.get("/walls/4/history", limit=3, after=told["next"], session=run.session)
+    rest = server.get("/walls/4/history", limit=3, after=told["next"], **kept)
     assert [wall["last_seen"] for wall in rest["history"]] == [103.0, 104.0]
     assert rest["next"] is None
     run.put(GRID, walls(stored(7)))
     wait_until(lambda: store.status.behind_s == 0)
-    gone = server.get("/walls/4/history")
+    gone = server.get("/walls/4/history", **kept)
     assert gone["wall"] is None
     assert gone["history"][-1]["length"] == 5.0
-    assert "wall 9" in assert_problem(server.http.get("/walls/9/history"), 404)["detail"]
+    assert "wall 9" in assert_problem(server.http.get("/walls/9/history", params=kept), 404)["detail"]
     assert_problem(server.http.get("/walls/4/history", params={"session": 99}), 404)
     assert_problem(server.http.get(f"/walls/{2**70}/history"), 422)
 
