@@ -20,9 +20,7 @@ from lidarcore.simulation.robot import RATE, SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
 _FREE = 254  # shade of a cell
-_SLEEP = (
-    0.001  # s, while keyframes wait to be joined to the map: here scans come faster than a sensor sends them
-)
+_SLEEP = 0.001  # s, while keyframes wait: here scans come faster than a sensor sends them
 
 
 @dataclass(frozen=True, slots=True)
