@@ -28,19 +28,21 @@ class TrackedPose:
 
 
 class Trail:
-    """Points at least STEP apart, and not too many."""
+    """Points at least STEP apart, and not too many: of a long way they are farther apart, as far everywhere."""
 
     def __init__(self) -> None:
         self.points: Array = np.empty((0, 2))
+        self._step = STEP
 
     def add(self, xy: Array) -> None:
         """Go on to a point (2,) m; a step too small to see adds none."""
         if not np.isfinite(xy).all():
             return
-        if len(self.points) and np.hypot(*(xy - self.points[-1])) < STEP:
+        if len(self.points) and np.hypot(*(xy - self.points[-1])) < self._step:
             return
-        kept = self.points if len(self.points) < MOST else self.points[::2]
-        self.points = np.vstack([kept, xy])
+        if len(self.points) >= MOST:
+            self.points, self._step = self.points[::2], 2 * self._step
+        self.points = np.vstack([self.points, xy])
 
 
 @dataclass(frozen=True, slots=True)

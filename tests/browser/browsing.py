@@ -104,11 +104,13 @@ class Server:
     def pause(self) -> dict:
         """The frame that stays. One scan back and forward again: what was in the making before has been shown then."""
         self.patch("source", {"state": "paused"})
-        for by in (-1, 1):
-            index = self.api.post("source/step", json={"by": by}).raise_for_status().json()["index"]
-            wait_until(
-                lambda index=index: self.get("frame")["source"]["index"] == index, f"scan {index} is shown"
-            )
+        self.step(-1)
+        return self.step(1)
+
+    def step(self, by: int) -> dict:
+        """The frame of the scan so many later, or earlier."""
+        index = self.api.post("source/step", json={"by": by}).raise_for_status().json()["index"]
+        wait_until(lambda: self.get("frame")["source"]["index"] == index, f"scan {index} is shown")
         return self.get("frame")
 
     def disturb(self, *commands: str) -> None:

@@ -13,6 +13,7 @@ from playwright.sync_api import expect
 from waiting import wait_until
 
 KINDS = ("consistent", "published")
+SCANS = 20
 FIGURES = {"area_ratio": (1, 2), "coverage_50": (100, 0), "coverage_95": (100, 1), "coverage_99": (100, 1)}
 LINES = (
     "node => { const all = new Range(); all.selectNodeContents(node); return all.getClientRects().length; }"
@@ -37,25 +38,33 @@ def tab(visitor: Visitor) -> Visitor:
     page.get_by_role("tab", name="Repeatability").click()
     page.get_by_role("switch", name="Compare with the scatter").click()
     number = page.get_by_role("spinbutton", name="Window")
-    number.fill("20")
+    number.fill(str(SCANS))
     page.keyboard.press("Enter")
-    wait_until(lambda: visitor.server.get("settings")["repeatability"] == {"running": True, "window": 20})
-    wait_until(lambda: found(visitor.server)["scans"] == 20, "the window is full")
+    wait_until(lambda: visitor.server.get("settings")["repeatability"] == {"running": True, "window": SCANS})
+    wait_until(lambda: found(visitor.server)["scans"] == SCANS, "the window is full")
     return visitor
 
 
 def still(visitor: Visitor) -> dict[str, Any]:
-    """What is found when no scan comes any more, and the page shows it."""
-    visitor.server.pause()
-    before = None
-    while before != (before := found(visitor.server)):  # scans that waited are worked on
-        visitor.page.wait_for_timeout(100)
-    visitor.server.patch(
-        "settings", {"view": {"layers": {"rejected": True}}}
-    )  # the page is told, and asks again
-    wanted = rows(before)
-    wait_until(lambda: shown(visitor) == wanted, "the table shows what is found")
-    return before
+    """What is found of twenty scans after which none comes any more, and the page shows it.
+
+    How many scans still wait to be compared, nobody can tell from outside: so it starts over with the first of them.
+    """
+    server = visitor.server
+    server.patch("settings", {"repeatability": {"running": False}})
+    server.pause()
+    server.step(1 - SCANS)
+    server.patch("settings", {"repeatability": {"running": True}})  # starts over with the scan that is shown
+    for scans in range(1, SCANS + 1):
+        wait_until(lambda scans=scans: found(server)["scans"] == scans, f"{scans} scans are compared")
+        if scans < SCANS:
+            server.step(1)
+    told = found(server)
+    server.patch("settings", {"view": {"layers": {"rejected": True}}})  # the page is told, and asks again
+    wait_until(lambda: shown(visitor) == rows(told), "the table shows what is found")
+    # The corner whose dots the page asked for may have gone with the window before.
+    visitor.errors[:] = [error for error in visitor.errors if "404" not in error]
+    return told
 
 
 def text(figure: float | None, factor: float, digits: int) -> str:

@@ -1,6 +1,7 @@
 """Walls that stand still: lines of known scatter, walls that fall apart, and stations of recordings."""
 
 import json
+import re
 from dataclasses import replace
 from itertools import islice
 
@@ -184,6 +185,11 @@ def test_the_command_judges_every_station_and_writes_its_figures(data, tmp_path)
     result = CliRunner().invoke(cli, arguments)
     assert result.exit_code == 0, result.output
     assert "95 % ellipses against the scatter" in result.output
+    asked = re.findall(r"([\d.]+) │ +([≥≤]?) ?([\d.]+)(?:–([\d.]+))? │ +(held|missed)", result.output)
+    assert {word for *_, word in asked} == {"held", "missed"}
+    for measured, sign, first, second, word in asked:
+        low, high = {"≥": (first, "inf"), "≤": ("-inf", first), "": (first, second)}[sign]
+        assert (float(low) <= float(measured) <= float(high)) == (word == "held")
     told = json.loads(output.read_text())
     (station,) = told["stations"]
     assert (station["name"], station["scans"]) == ("golf_room", 946)

@@ -81,6 +81,17 @@ def test_the_svg_is_well_formed_and_shows_every_wall(folder):
     assert ((-corners[:, 1] > y) & (-corners[:, 1] < y + height)).all()
 
 
+def test_on_the_plan_y_is_up(folder):
+    """A viewer draws the y of an SVG downwards, times what the groups around it say."""
+    drawing = ElementTree.parse(folder / "plan.svg").getroot()[-2]
+    x_scale, y_scale = map(float, drawing.get("transform").removeprefix("scale(").removesuffix(")").split())
+    walls = next(group for group in drawing if group.get("id") == "walls")
+    ends = np.array(
+        [[place.split() for place in wall.get("d")[1:].split("L")] for wall in walls], np.float64
+    ) * (x_scale, -y_scale)
+    np.testing.assert_allclose(ends, room()[1].ends, atol=5e-4)
+
+
 def test_csv_and_geojson_say_the_same(folder):
     walls = room()[1]
     rows = list(csv.DictReader(io.StringIO((folder / "walls.csv").read_text())))

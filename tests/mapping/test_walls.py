@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from chance import SURE
 from scipy.stats import binom, chi2
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise
@@ -90,15 +91,21 @@ def test_both_faces_of_a_wall_between_rooms_are_walls():
     assert np.abs(np.sort(faces[..., 0].mean(axis=1)) - [-0.06, 0.06]).max() < 0.01
 
 
-def test_a_free_end_lies_between_the_beams_that_meet_it_and_those_that_pass():
-    outline = rectangular_room(8, 6).walls
-    panel = np.array([[[-1.0, 0.5], [1.13, 0.5]]])
-    poses = np.column_stack([np.linspace(-1.2, 1.2, 9), np.full(9, -1.4), np.zeros(9)])
-    walls = mapped(World(np.concatenate([outline, panel])), poses)
-    (i,) = np.flatnonzero(np.abs(walls.ends[..., 1] - 0.5).max(axis=1) < 0.1)
-    assert walls.ended[i].all()
-    assert not walls.in_corner[i].any()
-    assert abs(walls.length[i] - 2.13) < 4 * np.sqrt(walls.length_variance[i]) < 0.04
+def test_free_ends_lie_between_the_beams_that_meet_them_and_those_that_pass():
+    """An end at the last beam that met it would make each panel shorter by four to seven standard deviations."""
+    spans = np.array([[-3.31, -2.12], [-1.27, -0.2], [0.4, 1.53], [2.07, 3.36]])
+    panels = np.stack([spans, np.full((4, 2), 0.5)], -1)
+    poses = np.column_stack([np.linspace(-2.4, 2.4, 15), np.full(15, -1.4), np.zeros(15)])
+    walls = mapped(World(np.concatenate([rectangular_room(8, 6).walls, panels])), poses)
+    free = np.flatnonzero(np.abs(walls.ends[..., 1] - 0.5).max(axis=1) < 0.1)
+    free = free[np.argsort(walls.ends[free, :, 0].min(axis=1))]
+    assert walls.ended[free].all()
+    assert not walls.in_corner[free].any()
+    sigma = np.sqrt(walls.length_variance[free])
+    assert sigma.max() < 0.01
+    off = (walls.length[free] - np.diff(spans)[:, 0]) / sigma
+    assert np.abs(off).max() < SURE
+    assert abs(off.mean()) < SURE / 2
 
 
 def test_a_door_that_opened_cuts_the_wall_and_one_that_is_closed_does_not():
