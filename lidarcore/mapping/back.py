@@ -17,6 +17,7 @@ from lidarcore.mapping.refinement import Refined, Step, refine
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.sight import sight
 from lidarcore.mapping.sweep import without
+from lidarcore.mapping.thinning import spare
 from lidarcore.mapping.tracked import Tracked
 
 _AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map
@@ -35,11 +36,12 @@ class Snapshot(NamedTuple):
 class BackEnd:
     """A pose graph of keyframes that closes loops.
 
-    lock      held while keyframes are added; what does not hold it may read the snapshot only
-    snapshot  the map after the last keyframe
-    graph     PoseGraph of the keyframes
-    loops  the loops that were believed
-    steps  how each keyframe was reached, by motion alone
+    lock       held while keyframes are added; what does not hold it may read the snapshot only
+    snapshot   the map after the last keyframe
+    graph      PoseGraph of the keyframes
+    keyframes  by their nodes, in the order of time; `thin` leaves some nodes without
+    loops      the loops that were believed
+    steps      how each keyframe was reached, by motion alone
     """
 
     def __init__(self, settings: MapperSettings) -> None:
@@ -48,7 +50,7 @@ class BackEnd:
         self.snapshot = Snapshot((), np.empty((0, 3)), ())
         self.graph = PoseGraph()
         self.loops: list[Loop] = []
-        self.keyframes: list[Keyframe] = []
+        self.keyframes: dict[int, Keyframe] = {}
         self.steps: list[Step] = []
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
@@ -60,14 +62,21 @@ class BackEnd:
             if tracked.first is not None:
                 self.keyframes[0] = _keyframe(tracked.first)
             self._add(tracked, keyframe, search)
-            self.snapshot = Snapshot(tuple(self.keyframes), self.graph.poses, tuple(self.loops))
+            self.snapshot = Snapshot(tuple(self.keyframes.values()), self.graph.poses, tuple(self.loops))
+
+    def thin(self) -> None:
+        """Let go of the scans that say what others say too; their nodes stay. A map that was thinned is not refined."""
+        nodes = np.array(list(self.keyframes), np.int64)
+        for node in spare(nodes, self.graph.poses[nodes]).tolist():
+            del self.keyframes[node]
 
     def _add(self, tracked: Tracked, keyframe: Keyframe, search: bool) -> None:
-        self.keyframes.append(keyframe)
-        if len(self.keyframes) == 1:
+        if not self.keyframes:
+            self.keyframes[0] = keyframe
             return
         pose, P = tracked.tie
         node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
+        self.keyframes[node] = keyframe
         self.steps.append(Step(tracked.node, node, *tracked.moved))
         self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
         if tracked.island:
@@ -93,8 +102,8 @@ class BackEnd:
     def refine(self) -> Refined:
         """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""
         self.graph.optimize()
-        scans = [keyframe.patches for keyframe in self.keyframes]
-        sweeps = np.array([keyframe.sweep for keyframe in self.keyframes])
+        scans = [keyframe.patches for keyframe in self.keyframes.values()]
+        sweeps = np.array([keyframe.sweep for keyframe in self.keyframes.values()])
         refined = refine(
             scans,
             self.graph.poses,
@@ -106,7 +115,7 @@ class BackEnd:
         )
         self.graph.move(refined.poses)
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
-        self.snapshot = Snapshot(tuple(self.keyframes), refined.poses, tuple(self.loops))
+        self.snapshot = Snapshot(tuple(self.keyframes.values()), refined.poses, tuple(self.loops))
         return refined
 
     def _join(self, k: int) -> int:

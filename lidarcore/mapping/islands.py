@@ -32,7 +32,7 @@ class Found(NamedTuple):
 class Islands:
     """Which island each node of a graph is on, and where the newest one lies in the others."""
 
-    def __init__(self, graph: PoseGraph, keyframes: list[Keyframe]) -> None:
+    def __init__(self, graph: PoseGraph, keyframes: dict[int, Keyframe]) -> None:
         self._graph, self._keyframes = graph, keyframes
         self._begins: list[tuple[int, int]] = [(0, 0)]  # first node of a stretch, and its island
         self._count = 1
@@ -75,8 +75,9 @@ class Islands:
             if len(ground) < _TOGETHER:
                 continue
             if island not in self._relocators:
-                scans = [self._keyframes[n].scan for n in ground]
-                self._relocators[island] = Relocator(build_grid(scans, poses[ground]))
+                kept = [n for n in ground.tolist() if n in self._keyframes]
+                scans = [self._keyframes[n].scan for n in kept]
+                self._relocators[island] = Relocator(build_grid(scans, poses[kept]))
             at = self._relocators[island].find(query)
             if at.found:
                 return self._confirmed(Found(k, island, at.pose), poses)

@@ -39,7 +39,7 @@ class LoopFinder:
     """Ties nodes of a graph to earlier ones."""
 
     def __init__(
-        self, graph: PoseGraph, keyframes: list[Keyframe], loops: LoopSettings, match: MatchSettings
+        self, graph: PoseGraph, keyframes: dict[int, Keyframe], loops: LoopSettings, match: MatchSettings
     ) -> None:
         self._graph, self._keyframes, self._settings, self._match_settings = graph, keyframes, loops, match
         self._waiting: list[Loop] = []
@@ -63,6 +63,7 @@ class LoopFinder:
 
     def tie(self, nodes: Ints, k: int, P: Array) -> Loop | None:
         """Node k registered on the earlier node that saw most of the same; the graph has it right within P (3, 3)."""
+        nodes = self._kept(nodes)
         i = self._best(nodes, k, P) if len(nodes) else None
         if i is None:
             return None
@@ -93,9 +94,10 @@ class LoopFinder:
         """Earlier nodes worth a match, with the covariance of k seen from there: the best of each pass nearby."""
         settings, poses = self._settings, self._graph.poses
         distances = np.hypot(*(poses[: max(k - settings.apart, 0), :2] - poses[k, :2]).T)
-        candidates = np.flatnonzero(distances < settings.farthest)
         found = []
-        for run in _runs(candidates):
+        for run in map(self._kept, _runs(np.flatnonzero(distances < settings.farthest))):
+            if not len(run):
+                continue
             closest = int(run[np.argmin(distances[run])])
             P = self._graph.relative(closest, k)[1]
             if P[2, 2] > VAGUE**2:
@@ -124,8 +126,14 @@ class LoopFinder:
 
     def _submap(self, around: int, nodes: range) -> Patches:
         """What nodes saw together, seen from one of them."""
-        poses = relative(self._graph.poses[around], self._graph.poses[nodes.start : nodes.stop])
-        return joined([self._keyframes[n].patches for n in nodes], poses)
+        kept = self._kept(np.array(nodes))
+        poses = relative(self._graph.poses[around], self._graph.poses[kept])
+        return joined([self._keyframes[n].patches for n in kept], poses)
+
+    def _kept(self, nodes: Ints) -> Ints:
+        """Those of the nodes whose scans are still there."""
+        there: Ints = nodes[np.array([n in self._keyframes for n in nodes.tolist()], bool)]
+        return there
 
     def _hypotheses(self, i: int, k: int, P: Array, seen: Patches) -> list[Loop]:
         """Where node k may be, seen from around node i: the best place, and its rival if that is nearly as good."""

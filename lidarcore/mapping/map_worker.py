@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from lidarcore.errors import GridError, LocalizationError
-from lidarcore.geometry import UncertainPose
+from lidarcore.geometry import UncertainPose, pose_difference
 from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.back import BackEnd
 from lidarcore.mapping.background import END_WITHIN, Corrected, MapPicture
@@ -22,6 +22,8 @@ from lidarcore.threads import FailureLog
 
 _EVERY = 1.0  # s between two pictures of the map, at least
 _REST = 10.0  # times as long as the walls took to find, they are not sought again
+_THINNED_EVERY = 50  # keyframes
+_TURNED = 0.005  # rad by which a keyframe turns until the grid is drawn anew: a cell at 10 m
 _MOST_CELLS = 16_000_000  # of the grid; a larger building gets larger cells
 _NOT_CONNECTED = "The scan lies on nothing known: odometry or the last motion alone says where the sensor is."
 _ISLAND = (
@@ -50,7 +52,7 @@ class MapWorker:
         self.picture: MapPicture | None = None
         self._extraction = extraction
         self._back = BackEnd(settings)
-        self._builder, self._drawn = GridBuilder(GridSettings(most_cells=_MOST_CELLS)), 0
+        self._begin_grid(GridSettings(most_cells=_MOST_CELLS))
         self._wall_ids = WallIds()
         self._next_picture = self._next_walls = 0.0
         self._failures = FailureLog("the map could not be brought up to date")
@@ -90,17 +92,17 @@ class MapWorker:
     def _step(self, tracked: Tracked | None) -> None:
         if tracked is not None:
             self._add(tracked)
-        if self._drawn < len(self._back.keyframes) and time.monotonic() >= self._next_picture:
+        if len(self._drawn) < len(self._back.graph) and time.monotonic() >= self._next_picture:
             self._draw()
 
     def _add(self, tracked: Tracked) -> None:
-        loops = len(self._back.loops)
         self._back.add(tracked)
         graph = self._back.graph
         self.corrected = Corrected(graph.poses, graph.covariance(len(graph) - 1))
-        if len(self._back.loops) > loops or tracked.first is not None:
-            self._builder.clear()
-            self._drawn = 0
+        if len(graph) % _THINNED_EVERY == 0:
+            self._back.thin()
+        if tracked.first is not None:
+            self._begin_grid(self._builder.settings)
 
     def _draw(self) -> None:
         self._next_picture = time.monotonic() + _EVERY
@@ -108,7 +110,7 @@ class MapWorker:
             self._bring_up_to_date()
         except GridError:  # too large for such cells
             finer = self._builder.settings
-            self._builder, self._drawn = GridBuilder(replace(finer, resolution=2 * finer.resolution)), 0
+            self._begin_grid(replace(finer, resolution=2 * finer.resolution))
             self._bring_up_to_date()
         grid = self._builder.grid()
         self.picture = MapPicture(grid, self.picture.walls if self.picture else None)
@@ -120,15 +122,24 @@ class MapWorker:
             end = time.monotonic()
             self._next_walls = end + _REST * (end - begin)
 
+    def _begin_grid(self, settings: GridSettings) -> None:
+        self._builder, self._drawn = GridBuilder(settings), np.empty((0, 3))
+
     def _bring_up_to_date(self) -> None:
-        """Add to the grid the keyframes that it lacks."""
-        poses = self._back.graph.poses
-        for keyframe, pose in zip(self._back.keyframes[self._drawn :], poses[self._drawn :], strict=False):
-            self._builder.add(keyframe.scan, pose)
-            self._drawn += 1
+        """Add to the grid the keyframes that it lacks; draw it anew if loops have moved those that it has."""
+        poses, settings = self._back.graph.poses, self._builder.settings
+        off = pose_difference(poses[: len(self._drawn)], self._drawn)
+        if (np.abs(off) > [settings.resolution, settings.resolution, _TURNED]).any():
+            self._begin_grid(settings)
+        for node in range(len(self._drawn), len(poses)):
+            if node in self._back.keyframes:
+                self._builder.add(self._back.keyframes[node].scan, poses[node])
+            self._drawn = poses[: node + 1]
 
     def _walls(self, grid: OccupancyGrid) -> Walls:
-        graph, scans = self._back.graph, [keyframe.scan for keyframe in self._back.keyframes]
-        covariances = np.array([graph.covariance(k) for k in range(len(scans))])
-        found = find_walls(scans, graph.poses, covariances, grid, extraction=self._extraction)
+        nodes, keyframes = list(self._back.keyframes), self._back.keyframes.values()
+        graph, scans = self._back.graph, [keyframe.scan for keyframe in keyframes]
+        found = find_walls(
+            scans, graph.poses[nodes], graph.covariances()[nodes], grid, extraction=self._extraction
+        )
         return self._wall_ids.identified(found)

@@ -149,8 +149,7 @@ class Mapper:
         """The scans that make the map, their poses and covariances; takes a while."""
         with self._back.lock:
             snapshot, known = self._back.snapshot, self._known
-            numbers = range(len(snapshot.poses))
-            covariances = np.array([known.covariance(k) for k in numbers]).reshape(-1, 3, 3)
+            covariances = known.covariances()[: len(snapshot.poses)]
         scans = tuple(keyframe.scan for keyframe in snapshot.keyframes)
         return Keyframes(np.array(self._numbers[: len(scans)], np.int64), scans, snapshot.poses, covariances)
 

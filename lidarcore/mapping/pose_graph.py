@@ -5,13 +5,10 @@ a sparse factor [Kümmerle et al. 2011], and the covariances that are asked for 
 may be wrong are scaled down by how much they disagree [Agarwal et al. 2013], new ones step by step [Yang et al. 2020].
 """
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array, csc_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import LocalizationError
@@ -19,6 +16,7 @@ from lidarcore.geometry import UncertainPose, as_pose_covariance, relative, rela
 from lidarcore.localization.ekf.estimate import as_pose
 from lidarcore.mapping.doubt import DOUBTFUL
 from lidarcore.mapping.edges import edge_errors, linearise
+from lidarcore.mapping.recovery import Recovery, factor
 
 _COOLING = 4.0  # by which doubts about new edges set in earlier from round to round
 _FIXED = 1e12  # information of the first pose
@@ -34,7 +32,7 @@ class PoseGraph:
         self._informations = np.empty((0, 3, 3))
         self._doubts = np.empty(0)
         self._settled = 0  # number of edges that took part in the last optimization
-        self._recovery: _Recovery | None = None
+        self._recovery: Recovery | None = None
 
     def __len__(self) -> int:
         return len(self._poses)
@@ -57,7 +55,6 @@ class PoseGraph:
     def add(self, pose: ArrayLike) -> int:
         """Append a node at a pose (3,), T_world_node as far as is known. Returns its number."""
         self._poses = np.concatenate([self._poses, as_pose(pose, "The pose")[None]])
-        self._recovery = None
         return len(self) - 1
 
     def move(self, poses: Array) -> None:
@@ -76,12 +73,13 @@ class PoseGraph:
         if i == j or not (0 <= i < len(self) and 0 <= j < len(self)):
             raise LocalizationError(f"There is no edge from node {i} to {j} in a graph of {len(self)} nodes.")
         z = as_pose(relative, "The relative pose")
-        information = np.linalg.inv(as_pose_covariance(covariance, "The covariance of the relative pose"))
+        P = as_pose_covariance(covariance, "The covariance of the relative pose")
+        information = np.linalg.inv(P)
         self._ends = np.concatenate([self._ends, [[i, j]]])
         self._relatives = np.concatenate([self._relatives, z[None]])
         self._informations = np.concatenate([self._informations, information[None]])
         self._doubts = np.append(self._doubts, DOUBTFUL if doubted else np.inf)
-        self._recovery = None
+        self._recovery = self._extended(i, j, P, doubted)
 
     def optimize(self, tolerance: float = 1e-6, rounds: int = 50) -> float:
         """Move the nodes to the most likely poses.
@@ -94,14 +92,14 @@ class PoseGraph:
         poses, heat, chi2 = self._poses.copy(), self._heat(), 0.0
         for _ in range(rounds):
             H, b, chi2 = self._linearised(poses, heat)
-            factor = _factor(H)
-            step = factor.solve(-b).reshape(-1, 3)
+            solver = factor(H)
+            step = solver.solve(-b).reshape(-1, 3)
             poses[1:] += step[1:]
             poses[:, 2] = wrap(poses[:, 2])
             if heat == 1 and np.abs(step).max() < tolerance:
                 break
             heat = max(1.0, heat / _COOLING)
-        self._poses, self._recovery, self._settled = poses, _Recovery(factor), len(self._ends)
+        self._poses, self._recovery, self._settled = poses, Recovery(solver), len(self._ends)
         return chi2
 
     def covariance(self, i: int) -> Array:
@@ -116,12 +114,26 @@ class PoseGraph:
         covariance = _symmetric(A @ block(i, i) @ A.T + 2 * mixed + B @ block(j, j) @ B.T)
         return UncertainPose(relative(self._poses[i], self._poses[j]), covariance)
 
+    def covariances(self) -> Array:
+        """(N, 3, 3): covariance of the pose of each node, given node 0."""
+        return self._recovered.diagonal()
+
     @property
-    def _recovered(self) -> "_Recovery":
-        if self._recovery is None:
+    def _recovered(self) -> Recovery:
+        if self._recovery is None or len(self._recovery) < len(self):
             self._check_connected()
-            self._recovery = _Recovery(_factor(self._linearised(self._poses, 1.0)[0]))
+            self._recovery = Recovery(factor(self._linearised(self._poses, 1.0)[0]))
         return self._recovery
+
+    def _extended(self, i: int, j: int, P: Array, doubted: bool) -> Recovery | None:
+        """What is known of the covariances still, if the newest node hangs on an edge from i with covariance P."""
+        known = self._recovery
+        if known is None or known.is_full or doubted or not i < j == len(known):
+            return None
+        A, B = relative_jacobians(self._poses[i], self._poses[j])
+        back = np.linalg.inv(B)
+        known.append(i, -back @ A, back @ P @ back.T)
+        return known
 
     def _check_connected(self) -> None:
         ones = np.ones(len(self._ends), np.int8)
@@ -153,26 +165,6 @@ class PoseGraph:
         return csc_matrix((entries, places), shape=(len(b), len(b))), b, chi2
 
 
-@dataclass(slots=True)
-class _Recovery:
-    """Blocks (3, 3) of the covariance from a factor of the information, three columns at a time [Eustice 2006]."""
-
-    factor: SuperLU
-    columns: dict[int, Array] = field(default_factory=dict)
-
-    def block(self, i: int, j: int) -> Array:
-        if j not in self.columns:
-            unit = np.zeros((self.factor.shape[0], 3))
-            unit[3 * j : 3 * j + 3] = np.eye(3)
-            self.columns[j] = self.factor.solve(unit)
-        return self.columns[j][3 * i : 3 * i + 3]
-
-
 def _symmetric(P: Array) -> Array:
     """Without the rounding of a sparse solution."""
     return (P + P.T) / 2
-
-
-def _factor(H: csc_matrix) -> SuperLU:
-    """Factor of a symmetric positive definite matrix."""
-    return splu(H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})

@@ -5,12 +5,11 @@ worth. Here each patch counts once, and how far patches scatter is measured: noi
 that all patches of one view of one place share.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
 from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import (
@@ -26,6 +25,7 @@ from lidarcore.mapping.adjustment import NormalEquations, normal_equations
 from lidarcore.mapping.adjustment_cells import Groups, Observations
 from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.recovery import Recovery, factor
 
 _FIXED = 1e12  # information of the first pose
 _SETTLED = 1e-4  # m and rad
@@ -55,33 +55,30 @@ class Refined:
     sweeps: Array
     scale: float
     unevenness: float
-    _factor: SuperLU
-    _columns: dict[int, Array] = field(default_factory=dict)
+    _recovery: Recovery
 
-    def covariance(self, i: int) -> Array:
-        """Covariance (3, 3) of pose i as seen from the first: where that scan stands counts in all of them."""
-        return self.relative(0, i).covariance if i else np.zeros((3, 3))
+    def covariances(self) -> Array:
+        """(K, 3, 3) of the poses as seen from the first: where that scan stands counts in all of them."""
+        own = _turned(self.sweeps, self.poses[:, 2])
+        own += self._recovery.diagonal()
+        A, B = relative_jacobians(self.poses[:1], self.poses)
+        P: Array = A @ own[0] @ A.swapaxes(1, 2) + B @ own @ B.swapaxes(
+            1, 2
+        )  # they share nothing else: the first is fixed
+        P[0] = 0.0
+        return P
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j with its covariance."""
         A, B = relative_jacobians(self.poses[i], self.poses[j])
-        mixed = A @ self._block(i, j) @ B.T
+        mixed = A @ self._recovery.block(i, j) @ B.T
         P = A @ self._own(i) @ A.T + mixed + mixed.T + B @ self._own(j) @ B.T
         return UncertainPose(relative(self.poses[i], self.poses[j]), (P + P.T) / 2)
 
     def _own(self, i: int) -> Array:
         """Covariance (3, 3) of pose i itself."""
-        R = np.eye(3)
-        R[:2, :2] = rotation(self.poses[i, 2])
-        block: Array = self._block(i, i) + R @ self.sweeps[i] @ R.T
+        block: Array = self._recovery.block(i, i) + _turned(self.sweeps[i], self.poses[i, 2])
         return block
-
-    def _block(self, i: int, j: int) -> Array:
-        if j not in self._columns:
-            unit = np.zeros((3 * len(self.poses), 3))
-            unit[3 * j : 3 * j + 3] = np.eye(3)
-            self._columns[j] = self._factor.solve(unit)
-        return self._columns[j][3 * i : 3 * i + 3]
 
 
 def refine(
@@ -108,15 +105,16 @@ def refine(
     for _ in range(rounds):
         equations, cells = normal_equations(seen, poses, islands, size, scale, unevenness)
         H, g = _with_steps(equations, poses, steps)
-        factor = _factor(H)
-        step = factor.solve(-g).reshape(-1, 3)
+        step = factor(H).solve(-g).reshape(-1, 3)
         poses = poses + step
         poses[:, 2] = wrap(poses[:, 2])
         scale, unevenness = _measured(equations.groups, cells, len(poses))
         if np.abs(step).max() < _SETTLED:
             break
     equations, _ = normal_equations(seen, poses, islands, size, scale, unevenness)
-    return Refined(poses, sweeps, scale, unevenness, _factor(_with_steps(equations, poses, steps)[0]))
+    return Refined(
+        poses, sweeps, scale, unevenness, Recovery(factor(_with_steps(equations, poses, steps)[0]))
+    )
 
 
 def _observations(scans: list[Patches], assumed: float) -> Observations:
@@ -163,5 +161,9 @@ def _measured(groups: Groups, cells: int, keyframes: int) -> tuple[float, float]
     return float(scale), float(np.sqrt(shared))
 
 
-def _factor(H: csc_array) -> SuperLU:
-    return splu(H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+def _turned(covariances: Array, headings: Array) -> Array:
+    """Covariances (..., 3, 3) of poses, seen from poses with these headings (...,) themselves, in the map."""
+    R = np.zeros(covariances.shape)
+    R[..., :2, :2], R[..., 2, 2] = rotation(headings), 1.0
+    turned: Array = R @ covariances @ R.swapaxes(-1, -2)
+    return turned

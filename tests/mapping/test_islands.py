@@ -26,8 +26,8 @@ def charted(graph, keyframes, world, poses, at):
     rng = np.random.default_rng(len(keyframes))
     for seen_from, pose in zip(poses, at, strict=True):
         scan = full_scan(world, seen_from, NOISE, rng)
-        keyframes.append(
-            Keyframe(scan, patches(scan, MatchSettings(noise=NOISE)), sight(scan), np.zeros((3, 3)))
+        keyframes[len(keyframes)] = Keyframe(
+            scan, patches(scan, MatchSettings(noise=NOISE)), sight(scan), np.zeros((3, 3))
         )
         if len(keyframes) > 1:
             node = graph.add(pose)
@@ -38,7 +38,7 @@ def charted(graph, keyframes, world, poses, at):
 def around():
     """A way around the building, mapped, and its poses seen from the first."""
     poses = way(0.3, 1.0)
-    graph, keyframes = PoseGraph(poses[0]), []
+    graph, keyframes = PoseGraph(poses[0]), {}
     charted(graph, keyframes, BUILDING, poses, poses)
     return graph, keyframes, Islands(graph, keyframes), poses
 

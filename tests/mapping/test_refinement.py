@@ -116,5 +116,5 @@ def test_unevenness_that_patches_assume_does_not_count_twice():
         found.append(refine(scans, start, steps, 0.5, assumed=unevenness))
     bare, uneven = found
     np.testing.assert_allclose(uneven.poses, bare.poses, atol=1e-9)
-    np.testing.assert_allclose(uneven.covariance(4), bare.covariance(4), rtol=1e-6)
+    np.testing.assert_allclose(uneven.covariances()[4], bare.covariances()[4], rtol=1e-6)
     assert uneven.unevenness == pytest.approx(bare.unevenness)

@@ -1,0 +1,131 @@
+"""Covariances of the nodes of a pose graph from a sparse factor of its information."""
+
+import numpy as np
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import SuperLU, splu
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.compiled import kernel
+
+_MOST_LEAVES = 50  # nodes that are appended before the information is factored anew
+
+
+class Recovery:
+    """Blocks (3, 3) of the joint covariance of N nodes, by their information H (3 N, 3 N).
+
+    Single blocks come from three columns at a time [Eustice et al. 2006], those on the diagonal from the entries of
+    the factor alone [Kaess & Dellaert 2009]: all columns together would take 72 N² bytes.
+    """
+
+    def __init__(self, factor: SuperLU) -> None:
+        self._factor = factor
+        self._count = int(factor.shape[0]) // 3  # of the nodes that the factor knows
+        self._own: Array | None = None
+        self._columns: dict[int, Array] = {}
+        self._leaves: list[tuple[int, Array, Array]] = []
+
+    def __len__(self) -> int:
+        return self._count + len(self._leaves)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether so many nodes were appended that a new factor pays."""
+        return len(self._leaves) >= _MOST_LEAVES
+
+    def append(self, i: int, jacobian: Array, covariance: Array) -> None:
+        """One more node, that follows node i by a Jacobian (3, 3), and has a covariance (3, 3) of its own."""
+        self._leaves.append((i, jacobian, covariance))
+
+    def block(self, i: int, j: int) -> Array:
+        """Covariance (3, 3) of node i with node j."""
+        if i < j:
+            return self.block(j, i).T
+        if i < self._count:
+            return self._diagonal()[i] if i == j else self._column(i)[3 * j : 3 * j + 3].T
+        parent, J, own = self._leaves[i - self._count]
+        found: Array = J @ self.block(parent, parent) @ J.T + own if i == j else J @ self.block(parent, j)
+        return found
+
+    def diagonal(self) -> Array:
+        """(N, 3, 3): covariance of each node."""
+        leaves = [self.block(k, k) for k in range(self._count, len(self))]
+        return np.concatenate([self._diagonal(), np.reshape(leaves, (-1, 3, 3))])
+
+    def _diagonal(self) -> Array:
+        if self._own is None:
+            L, pivots = self._factor.L, self._factor.U.diagonal()
+            self._own = selected_inverse(L.indptr, L.indices, L.data, pivots, self._factor.perm_r)
+            for k in np.flatnonzero(np.isnan(self._own).any(axis=(1, 2))).tolist():
+                self._own[k] = self._solved(k)[3 * k : 3 * k + 3]
+        return self._own
+
+    def _column(self, j: int) -> Array:
+        if j not in self._columns:
+            self._columns[j] = self._solved(j)
+        return self._columns[j]
+
+    def _solved(self, j: int) -> Array:
+        unit = np.zeros((self._factor.shape[0], 3))
+        unit[3 * j : 3 * j + 3] = np.eye(3)
+        solved: Array = self._factor.solve(unit)
+        return solved
+
+
+def factor(H: csc_matrix) -> SuperLU:
+    """Factor of a symmetric positive definite matrix, its rows and columns in the same order."""
+    return splu(H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+
+
+@kernel
+def selected_inverse(begins: Ints, rows: Ints, lower: Array, pivots: Array, order: Ints) -> Array:
+    """Blocks (N, 3, 3) on the diagonal of the inverse of L diag(pivots) L^T, by Takahashi's recursion.
+
+    begins, rows, lower  L by columns: unit diagonal, and the entries that elimination fills, but for those that are 0
+    order                (3 N,) the row of L that each row of the matrix became
+
+    A block is NaN if it takes entries of the inverse that L has no place for, because they are 0 there.
+    """
+    size = len(pivots)
+    inverse, place, sums = np.empty(len(rows)), np.full(size, -1), np.empty(size)
+    for j in range(size - 1, -1, -1):
+        column = range(begins[j], begins[j + 1])
+        for e in column:
+            place[rows[e]], sums[rows[e]] = e, 0.0
+        met = 0
+        for e in column:
+            k = rows[e]
+            if k == j:
+                continue
+            for f in range(begins[k], begins[k + 1]):
+                i = rows[f]
+                if place[i] >= 0:
+                    met += 1
+                    sums[i] += lower[e] * inverse[f]
+                    if i != k:
+                        sums[k] += lower[place[i]] * inverse[f]
+        others = len(column) - 1
+        known = 1.0 if met == others * (others + 1) // 2 else np.nan
+        own = known / pivots[j]
+        for e in column:
+            if rows[e] != j:
+                inverse[e] = -known * sums[rows[e]]
+                own -= lower[e] * inverse[e]
+        inverse[place[j]] = own
+        for e in column:
+            place[rows[e]] = -1
+    return _blocks(begins, rows, inverse, order)
+
+
+@kernel
+def _blocks(begins: Ints, rows: Ints, inverse: Array, order: Ints) -> Array:
+    found = np.empty((len(order) // 3, 3, 3))
+    for k in range(len(found)):
+        for m in range(3):
+            for n in range(m + 1):
+                i, j = order[3 * k + m], order[3 * k + n]
+                i, j = max(i, j), min(i, j)
+                found[k, m, n] = found[k, n, m] = np.nan
+                for e in range(begins[j], begins[j + 1]):
+                    if rows[e] == i:
+                        found[k, m, n] = found[k, n, m] = inverse[e]
+    return found
