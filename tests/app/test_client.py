@@ -146,7 +146,8 @@ def landmarks_so_far(client: Client) -> int:
     try:
         return len(list(client.landmarks()))
     except ClientError as error:
-        assert error.status == 404
+        if error.status != 404:
+            raise
         return 0
 
 
