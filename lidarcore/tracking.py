@@ -11,7 +11,7 @@ from lidarcore.geometry import chi_square_gate, squared_mahalanobis
 
 GATE = 0.3  # m: a corner found farther away than this is another one
 MEMORY = 10  # frames a corner may be missing and still keep its id, if not told otherwise
-SAME = chi_square_gate(0.9999)  # Mahalanobis distance² between two sightings of one place
+SAME = 0.9999  # what lies in the ellipse that holds this share of the sightings of a place may be that place
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +114,9 @@ class Tracker:
             self._settle(ids, xy, covariances)
             return ids
         known = list(self._known)
-        at_home = _assigned([0] * len(xy), known, self._distances(known, xy, covariances), SAME)
+        at_home = _assigned(
+            [0] * len(xy), known, self._distances(known, xy, covariances), chi_square_gate(SAME)
+        )
         return _assigned(at_home, awake, steps, GATE)
 
     def _distances(self, ids: list[int], xy: Array, covariances: Array) -> Array:
@@ -131,7 +133,7 @@ class Tracker:
         if not len(rows):
             return False
         seen = self._distances([ids[row] for row in rows], xy[rows], covariances[rows]).diagonal()
-        return bool(np.median(seen) > SAME)
+        return bool(np.median(seen) > chi_square_gate(SAME))
 
     def _settle(self, ids: list[int], xy: Array, covariances: Array) -> None:
         """Where hidden corners are is not known any more; the others begin anew from here."""

@@ -4,8 +4,13 @@ Most recordings lie beside the checkout, because their licences do not allow shi
 along.
 """
 
-import fcntl
 import os
+
+# Before numpy is loaded, here and in what tests start: there are as many processes as cores already, and threads of
+# linear algebra that wait for each other take several times the processor time.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import fcntl
 import signal
 from pathlib import Path
 

@@ -9,8 +9,6 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from lidarcore import threads
-
 ROOT = Path(__file__).parents[2]  # nothing that lies in the current folder is imported by the study
 NICE = 10  # live view comes first
 PROGRESS = "progress"  # what a line of it begins with: progress DONE TOTAL
@@ -46,6 +44,10 @@ class StudyProcess:
         """End it now; its workers end with it. `ended` has been told when this returns."""
         self._process.kill()
         if self._reader is not threading.current_thread():
+            from lidarcore import (
+                threads,  # here: the command line, which needs PROGRESS, answers at once without it
+            )
+
             threads.join(self._reader, END_WITHIN)
 
     def _read(self) -> None:

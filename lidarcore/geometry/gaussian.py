@@ -4,7 +4,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtri
 
 from lidarcore.arrays import Array, Numbers
 from lidarcore.errors import CovarianceError
@@ -34,6 +33,8 @@ def rotated_covariance(
 @lru_cache
 def chi_square_gate(probability: float, dimensions: int = 2) -> float:
     """Squared Mahalanobis distance that this share of a Gaussian's draws stays below."""
+    from scipy.special import chdtri  # here: importing it takes as long as half of lidarcore
+
     return float(chdtri(dimensions, 1 - probability))
 
 

@@ -12,6 +12,7 @@ import httpx
 import numpy as np
 import pyarrow.parquet
 import pytest
+from lidarcore_app.cli.main import main
 from lidarcore_app.web.serving import listen
 from processes import Serving, assert_refused, run
 from serving import ROOT, write_room
@@ -21,7 +22,7 @@ from lidarcore import ExtractionSettings, compare, open_recording
 
 def test_help_is_instant_and_names_every_command() -> None:
     """It waits for nothing that takes long to import."""
-    command = [sys.executable, "-c", "import sys, app.cli; print(*sys.modules)"]
+    command = [sys.executable, "-c", "import sys, lidarcore_app.cli.main; print(*sys.modules)"]
     loaded = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     assert {"numpy", "numba", "scipy", "fastapi", "viser", "httpx"} & set(loaded) == set()
     result = run("--help")
@@ -139,8 +140,18 @@ def test_processing_what_breaks_leaves_no_file_and_the_old_one_as_it_was(tmp_pat
         ("fitter=magic", ["magic", "wctls"]),
     ],
 )
-def test_a_bad_setting_is_named(tmp_path: Path, setting: str, words: list[str]) -> None:
-    assert_refused(run("process", "any.bag", "-o", tmp_path / "x.csv", "--set", setting), *words)
+def test_a_bad_setting_is_named(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    setting: str,
+    words: list[str],
+) -> None:
+    command = ["lidarcore", "process", "any.bag", "-o", str(tmp_path / "x.csv"), "--set", setting]
+    monkeypatch.setattr(sys, "argv", command)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert_refused(subprocess.CompletedProcess(command, ended.value.code, *capsys.readouterr()), *words)
 
 
 @pytest.mark.long

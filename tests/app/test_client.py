@@ -141,6 +141,16 @@ def test_sessions_and_maps_come_and_go(client: Client, large: list[Landmark], tm
         client.import_map(bad)
 
 
+def landmarks_so_far(client: Client) -> int:
+    """None before the first scan of the map, which the server says as an error."""
+    try:
+        return len(list(client.landmarks()))
+    except ClientError as error:
+        if error.status != 404:
+            raise
+        return 0
+
+
 def test_a_robot_drives_by_it(make_server: Callable[..., Server], folder: Path) -> None:
     """A sensor that stands still in a room of four corners."""
     server = make_server(recording=write_room(folder / "room.npz", scans=300))
@@ -150,12 +160,13 @@ def test_a_robot_drives_by_it(make_server: Callable[..., Server], folder: Path) 
         assert client.trajectory() == []
         assert client.set(navigation={"mode": "slam", "method": "landmarks"})["navigation"]["mode"] == "slam"
         assert client.settings()["navigation"]["mode"] == "slam"
-        wait_until(lambda: client.sessions() and len(list(client.landmarks())) == 4)
+        wait_until(lambda: landmarks_so_far(client) == 4)
         found = np.array([m.xy for m in client.landmarks()])
         assert np.linalg.norm(found[:, None] - CORNERS, axis=2).min(0).max() < 0.05
         corners = client.corners()
         assert np.linalg.norm([one.xy - CORNERS for one in corners[:1]], axis=2).min() < 0.05
         assert {one.covariance.shape for one in corners} == {(2, 2)}
+        wait_until(lambda: len(client.trajectory()) >= 5)
         pose = client.pose()
         assert (pose.mode, pose.pose.shape, pose.covariance.shape) == ("slam", (3,), (3, 3))
         np.testing.assert_allclose(pose.pose, 0, atol=0.05)

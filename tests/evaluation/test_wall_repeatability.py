@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 from lidarcore import ExtractionSettings, Features, Scan, SensorNoise, open_recording
 from lidarcore import tables as columns
 from lidarcore.evaluation.repeatability.statistics import Repeatability
+from lidarcore.evaluation.stations.limits import limits
 from lidarcore.evaluation.stations.recording import standstills, stations
 from lidarcore.evaluation.stations.study import study
 from lidarcore.simulation.robot import SimulatedRobot
@@ -161,6 +162,9 @@ def test_stations_are_judged_with_the_noise_that_their_first_half_tells() -> Non
         found = study([("room", taken)], (METHOD, "utls"), wrong, window=75, calibrated=calibrated)
         (station,) = found.stations
         assert station.remark is None
+        missed = {limit.figure for limit in limits(found, METHOD) if limit.of == "walls" and not limit.held}
+        assert "claimed / scatter" not in missed
+        assert calibrated or "in 95 % ellipses" in missed
         for figures in (found.walls, found.corners):
             held = figures.coverage(0)
             assert figures.sightings(0) > 500
