@@ -36,6 +36,41 @@ def compose_with_jacobians(T_a_b: Array, T_b_c: Array) -> tuple[Array, Array, Ar
 
 
 @kernel
+def compose_with_covariance(T_a_b: Array, own: Array, T_b_c: Array, other: Array) -> tuple[Array, Array]:
+    """T_a_c (3,) of two poses whose errors are independent, with covariances (3, 3) of both; and its covariance."""
+    pose, F, G = compose_with_jacobians(T_a_b, T_b_c)
+    return pose, _carried(F, own, F) + _carried(G, other, G)
+
+
+@kernel
+def relative_with_covariance(
+    T_a_b: Array, T_a_c: Array, own: Array, mixed: Array, other: Array
+) -> tuple[Array, Array]:
+    """T_b_c (3,) and its covariance, of poses (3,) with covariances own and other (3, 3), and mixed between them."""
+    c, s = np.cos(T_a_b[2]), np.sin(T_a_b[2])
+    x, y = unrotate(c, s, T_a_c[0] - T_a_b[0], T_a_c[1] - T_a_b[1])
+    A, B = -np.eye(3), np.eye(3)
+    B[0, 0], B[0, 1], B[1, 0], B[1, 1] = c, s, -s, c
+    A[0, 0], A[0, 1], A[1, 0], A[1, 1] = -c, -s, s, -c
+    A[0, 2], A[1, 2] = y, -x
+    shared = _carried(A, mixed, B)
+    P = _carried(A, own, A) + shared + shared.T + _carried(B, other, B)
+    return np.array([x, y, wrap(T_a_c[2] - T_a_b[2])]), (P + P.T) / 2
+
+
+@inlined
+def _carried(A: Array, C: Array, B: Array) -> Array:
+    """A C B^T of matrices (3, 3)."""
+    carried = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            for k in range(3):
+                for m in range(3):
+                    carried[i, j] += A[i, k] * C[k, m] * B[j, m]
+    return carried
+
+
+@kernel
 def squared_mahalanobis(difference: Array, covariance: Array) -> float:
     """e^T C^-1 e of e (n,) and C (n, n), by Cholesky; NaN if C is not positive definite."""
     n = len(difference)

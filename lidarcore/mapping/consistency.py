@@ -7,6 +7,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, pose_difference, squared_mahalanobis
+from lidarcore.geometry.kernels import compose_with_covariance
 from lidarcore.mapping.pose_graph import PoseGraph
 
 # Share of the spread with which a loop was expected, up to which the way around tells whether it is true.
@@ -34,11 +35,10 @@ def agree(graph: PoseGraph, a: Loop, b: Loop, gate: float) -> bool:
     Where the way around is known little better than the graph expects the loops, any two would fit: a loop within one
     pass says nothing about a tie to another one.
     """
-    one = UncertainPose(a.pose, a.covariance).compose(_relative(graph, a.j, b.j))
-    two = _relative(graph, a.i, b.i).compose(UncertainPose(b.pose, b.covariance))
-    around = one.covariance + two.covariance
+    one, P = compose_with_covariance(a.pose, a.covariance, *_relative(graph, a.j, b.j))
+    two, Q = compose_with_covariance(*_relative(graph, a.i, b.i), b.pose, b.covariance)
     expected = min(spread(_relative(graph, loop.i, loop.j).covariance) for loop in (a, b))
-    return spread(around) < _TELLING * expected and squared(one.pose, two.pose, around) < gate
+    return spread(P + Q) < _TELLING * expected and squared(one, two, P + Q) < gate
 
 
 def agreeing(graph: PoseGraph, loop: Loop, others: Sequence[Loop], gate: float) -> list[Loop]:

@@ -12,7 +12,8 @@ from scipy.sparse.csgraph import connected_components
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import UncertainPose, as_pose_covariance, relative, relative_jacobians, wrap
+from lidarcore.geometry import UncertainPose, as_pose_covariance, relative_jacobians, wrap
+from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.localization.ekf.estimate import as_pose
 from lidarcore.mapping.doubt import DOUBTFUL
 from lidarcore.mapping.edges import edge_errors, linearise
@@ -108,11 +109,11 @@ class PoseGraph:
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j (3,) as the graph has it now, and its covariance (3, 3)."""
-        A, B = relative_jacobians(self._poses[i], self._poses[j])
         block = self._recovered.block
-        mixed = A @ block(i, j) @ B.T
-        covariance = _symmetric(A @ block(i, i) @ A.T + 2 * mixed + B @ block(j, j) @ B.T)
-        return UncertainPose(relative(self._poses[i], self._poses[j]), covariance)
+        found = relative_with_covariance(
+            self._poses[i], self._poses[j], block(i, i), block(i, j), block(j, j)
+        )
+        return UncertainPose(*found)
 
     def covariances(self) -> Array:
         """(N, 3, 3): covariance of the pose of each node, given node 0."""
@@ -126,13 +127,13 @@ class PoseGraph:
         return self._recovery
 
     def _extended(self, i: int, j: int, P: Array, doubted: bool) -> Recovery | None:
-        """What is known of the covariances still, if the newest node hangs on an edge from i with covariance P."""
+        """What stays known of covariances if an edge with covariance P ties the newest node to the one before."""
         known = self._recovery
-        if known is None or known.is_full or doubted or not i < j == len(known):
+        if known is None or doubted or not i + 1 == j == len(known):
             return None
         A, B = relative_jacobians(self._poses[i], self._poses[j])
         back = np.linalg.inv(B)
-        known.append(i, -back @ A, back @ P @ back.T)
+        known.append(-back @ A, back @ P @ back.T)
         return known
 
     def _check_connected(self) -> None:

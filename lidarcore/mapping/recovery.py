@@ -7,8 +7,6 @@ from scipy.sparse.linalg import SuperLU, splu
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
 
-_MOST_LEAVES = 50  # nodes that are appended before the information is factored anew
-
 
 class Recovery:
     """Blocks (3, 3) of the joint covariance of N nodes, by their information H (3 N, 3 N).
@@ -22,35 +20,40 @@ class Recovery:
         self._count = int(factor.shape[0]) // 3  # of the nodes that the factor knows
         self._own: Array | None = None
         self._columns: dict[int, Array] = {}
-        self._leaves: list[tuple[int, Array, Array]] = []
+        self._tail: list[
+            tuple[Array, Array]
+        ] = []  # how each node moves with the last that the factor knows, and P
 
     def __len__(self) -> int:
-        return self._count + len(self._leaves)
+        return self._count + len(self._tail)
 
-    @property
-    def is_full(self) -> bool:
-        """Whether so many nodes were appended that a new factor pays."""
-        return len(self._leaves) >= _MOST_LEAVES
-
-    def append(self, i: int, jacobian: Array, covariance: Array) -> None:
-        """One more node, that follows node i by a Jacobian (3, 3), and has a covariance (3, 3) of its own."""
-        self._leaves.append((i, jacobian, covariance))
+    def append(self, jacobian: Array, covariance: Array) -> None:
+        """One more node, that follows the last one by a Jacobian (3, 3), and has a covariance (3, 3) besides."""
+        last = len(self) - 1
+        moves = self._tail[-1][0] if self._tail else np.eye(3)
+        self._tail.append((jacobian @ moves, jacobian @ self.block(last, last) @ jacobian.T + covariance))
 
     def block(self, i: int, j: int) -> Array:
         """Covariance (3, 3) of node i with node j."""
         if i < j:
-            return self.block(j, i).T
+            return np.ascontiguousarray(self.block(j, i).T)
         if i < self._count:
-            return self._diagonal()[i] if i == j else self._column(i)[3 * j : 3 * j + 3].T
-        parent, J, own = self._leaves[i - self._count]
-        found: Array = J @ self.block(parent, parent) @ J.T + own if i == j else J @ self.block(parent, j)
+            return self._diagonal[i] if i == j else np.ascontiguousarray(self._column(i)[3 * j : 3 * j + 3].T)
+        moves, own = self._tail[i - self._count]
+        if i == j:
+            return own
+        if j < self._count:
+            return moves @ self.block(self._count - 1, j)
+        before, shared = self._tail[j - self._count]
+        found: Array = moves @ np.linalg.solve(before, shared)
         return found
 
     def diagonal(self) -> Array:
         """(N, 3, 3): covariance of each node."""
-        leaves = [self.block(k, k) for k in range(self._count, len(self))]
-        return np.concatenate([self._diagonal(), np.reshape(leaves, (-1, 3, 3))])
+        tail = [own for _, own in self._tail]
+        return np.concatenate([self._diagonal, np.reshape(tail, (-1, 3, 3))])
 
+    @property
     def _diagonal(self) -> Array:
         if self._own is None:
             L, pivots = self._factor.L, self._factor.U.diagonal()

@@ -21,6 +21,7 @@ from lidarcore.geometry import (
     squared_mahalanobis,
     wrap,
 )
+from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.mapping.adjustment import NormalEquations, normal_equations
 from lidarcore.mapping.adjustment_cells import Groups, Observations
 from lidarcore.mapping.doubt import DOUBTFUL, trust
@@ -70,10 +71,9 @@ class Refined:
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j with its covariance."""
-        A, B = relative_jacobians(self.poses[i], self.poses[j])
-        mixed = A @ self._recovery.block(i, j) @ B.T
-        P = A @ self._own(i) @ A.T + mixed + mixed.T + B @ self._own(j) @ B.T
-        return UncertainPose(relative(self.poses[i], self.poses[j]), (P + P.T) / 2)
+        mixed = self._recovery.block(i, j)
+        found = relative_with_covariance(self.poses[i], self.poses[j], self._own(i), mixed, self._own(j))
+        return UncertainPose(*found)
 
     def _own(self, i: int) -> Array:
         """Covariance (3, 3) of pose i itself."""

@@ -164,6 +164,22 @@ def test_the_compiled_composition_is_the_same(seed: int) -> None:
     np.testing.assert_allclose(kernels.unrotate(c, s, *xy), b[:2], atol=1e-12)
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_compiled_covariances_travel_as_those_on_arrays_do(seed: int) -> None:
+    a, b = poses((2,), seed)
+    root = np.random.default_rng(seed).normal(size=(6, 6))
+    joint = root @ root.T
+    own, mixed, other = joint[:3, :3].copy(), joint[:3, 3:].copy(), joint[3:, 3:].copy()
+    T, P = kernels.relative_with_covariance(a, b, own, mixed, other)
+    J = np.hstack(relative_jacobians(a, b))
+    np.testing.assert_allclose(pose_difference(T, relative(a, b)), np.zeros(3), atol=1e-12)
+    np.testing.assert_allclose(P, J @ joint @ J.T, rtol=1e-9, atol=1e-9)
+    T, P = kernels.compose_with_covariance(a, own, b, other)
+    expected = UncertainPose(a, own).compose(UncertainPose(b, other))
+    np.testing.assert_allclose(pose_difference(T, expected.pose), np.zeros(3), atol=1e-12)
+    np.testing.assert_allclose(P, expected.covariance, rtol=1e-9, atol=1e-9)
+
+
 @pytest.mark.parametrize("shape", SHAPES)
 def test_covariances_travel_as_the_poses_do(shape: tuple[int, ...]) -> None:
     """Associativity and inversion, which hold only if every Jacobian stands in the right place."""
