@@ -3,7 +3,6 @@
 import json
 
 import numpy as np
-import pytest
 from chance import fewest
 from lidarcore_app.cli.main import cli
 from typer.testing import CliRunner
@@ -37,7 +36,6 @@ def test_ellipses_hold_the_walls_where_they_truly_are_and_nowhere_else():
     assert (there[:, 0] < 0.1 * there[:, 1]).all()
 
 
-@pytest.mark.long
 def test_the_command_prints_and_writes_every_part(tmp_path):
     output = tmp_path / "study.json"
     arguments = ["evaluate", "calibration", "--rooms", "2", "--scans", "10", "--workers", "1"]

@@ -1,0 +1,77 @@
+"""`lidarcore evaluate map` and `relocation` on a simulated drive: what they print of true poses is what is so."""
+
+import re
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lidarcore_app.cli.main import cli
+from typer.testing import CliRunner
+
+from lidarcore.geometry import relative
+from lidarcore.simulation.robot import SimulatedRobot
+from lidarcore.simulation.settings import SimulationSettings
+
+EVERY = 4  # scans
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Forty seconds in the furnished room, saved with the true poses in place of odometry."""
+    scans = list(islice(SimulatedRobot(SimulationSettings(world="furnished room", seed=3)), 0, 400, EVERY))
+    path = tmp_path_factory.mktemp("drive") / "drive.npz"
+    np.savez(
+        path,
+        ranges=np.array([scan.ranges for scan in scans]),
+        bearings=scans[0].bearings,
+        stamps=np.array([scan.stamp for scan in scans]),
+        odometry=np.array([scan.truth for scan in scans]),
+    )
+    return path
+
+
+def said(*arguments: object) -> str:
+    result = CliRunner().invoke(cli, ["evaluate", *map(str, arguments)])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_a_map_is_judged_by_true_poses_and_by_relations(drive: Path, tmp_path: Path) -> None:
+    with np.load(drive) as file:
+        stamps, poses = file["stamps"], file["odometry"]
+    ends = np.array([(k, k + 40) for k in range(0, 60, 6)])
+    relations = tmp_path / "relations"
+    x, y, turn = relative(poses[ends[:, 0]], poses[ends[:, 1]]).T
+    zero = np.zeros(len(ends))
+    np.savetxt(relations, np.column_stack([stamps[ends], x, y, zero, zero, zero, turn]), fmt="%.9f")
+    told = said("map", drive, "--relations", relations, "--seeds", 2)
+    assert re.findall(r"^seed (\d)", told, re.MULTILINE) == ["0", "1"]
+    assert told.count("100, 100 of them tracked") == 2
+    assert re.findall(r"loops +(\d+), (\d+) of them wrong", told)[0][1] == "0"
+    for line in ("relative poses", "relations verified by hand"):
+        for count, mean, worst in re.findall(
+            rf"{line} +(\d+)[^:]*: mean ([\d.]+) m, .*largest ([\d.]+) m", told
+        ):
+            assert int(count) == len(ends) or line == "relative poses"
+            assert 0 < float(mean) < 0.05  # poor odometry alone errs by 3 % of 10 m and more
+            assert float(mean) <= float(worst) < 0.2
+    assert len(re.findall("relations verified", told)) == 2
+
+
+def test_poses_are_found_where_the_robot_came_by_before_and_none_elsewhere_is_believed(drive: Path) -> None:
+    rows = re.findall(
+        r"(one scan|six keyframes) +(\d+) +(\d+) +([\d.]+)% +(\d+) +(\d+) +(\d+)", said("relocation", drive)
+    )
+    assert [row[0] for row in rows] == ["one scan", "six keyframes"]
+    for _, queries, known, share, outside, found_outside, wrong in rows:
+        assert int(known) + int(outside) <= int(queries)
+        assert int(known) > 20
+        assert float(share) > 80
+        assert found_outside == wrong == "0"
+
+
+def test_what_is_no_deviation_of_the_reference_is_refused(drive: Path) -> None:
+    result = CliRunner().invoke(cli, ["evaluate", "map", str(drive), "--own", "0.02"])
+    assert result.exit_code != 0
+    assert "two numbers" in result.output
