@@ -7,7 +7,7 @@ may be wrong are scaled down by how much they disagree [Agarwal et al. 2013], ne
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array, csc_matrix
+from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
 
 from lidarcore.arrays import Array, Ints
@@ -105,7 +105,8 @@ class PoseGraph:
 
     def covariance(self, i: int) -> Array:
         """Covariance (3, 3) of the pose of node i, given node 0."""
-        return _symmetric(self._recovered.block(i, i))
+        P: Array = self._recovered.block(i, i)
+        return (P + P.T) / 2  # without the rounding of a sparse solution
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j (3,) as the graph has it now, and its covariance (3, 3)."""
@@ -154,7 +155,7 @@ class PoseGraph:
         new = slice(self._settled, None)
         return max(1.0, float((self.chi_square[new] / self._doubts[new]).max(initial=0)))
 
-    def _linearised(self, poses: Array, heat: float) -> tuple[csc_matrix, Array, float]:
+    def _linearised(self, poses: Array, heat: float) -> tuple[csc_array, Array, float]:
         """Information matrix H (3 N, 3 N), gradient b (3 N,) and chi-square at the poses, the first one fixed."""
         blocks, b = np.empty((len(self._ends), 6, 6)), np.zeros(3 * len(poses))
         doubts = heat * self._doubts
@@ -163,9 +164,4 @@ class PoseGraph:
         row, column = np.broadcast_arrays(index[:, :, None], index[:, None, :])
         entries = np.append(blocks.ravel(), [_FIXED] * 3)
         places = np.append(row.ravel(), [0, 1, 2]), np.append(column.ravel(), [0, 1, 2])
-        return csc_matrix((entries, places), shape=(len(b), len(b))), b, chi2
-
-
-def _symmetric(P: Array) -> Array:
-    """Without the rounding of a sparse solution."""
-    return (P + P.T) / 2
+        return csc_array((entries, places), shape=(len(b), len(b))), b, chi2

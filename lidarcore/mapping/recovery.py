@@ -1,7 +1,7 @@
 """Covariances of the nodes of a pose graph from a sparse factor of its information."""
 
 import numpy as np
-from scipy.sparse import csc_matrix
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
@@ -20,9 +20,8 @@ class Recovery:
         self._count = int(factor.shape[0]) // 3  # of the nodes that the factor knows
         self._own: Array | None = None
         self._columns: dict[int, Array] = {}
-        self._tail: list[
-            tuple[Array, Array]
-        ] = []  # how each node moves with the last that the factor knows, and P
+        # Of each node after those of the factor: how it moves with the factor's last one, and its own covariance.
+        self._tail: list[tuple[Array, Array]] = []
 
     def __len__(self) -> int:
         return self._count + len(self._tail)
@@ -74,7 +73,7 @@ class Recovery:
         return solved
 
 
-def factor(H: csc_matrix) -> SuperLU:
+def factor(H: csc_array) -> SuperLU:
     """Factor of a symmetric positive definite matrix, its rows and columns in the same order."""
     return splu(H, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 

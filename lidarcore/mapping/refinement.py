@@ -63,9 +63,8 @@ class Refined:
         own = _turned(self.sweeps, self.poses[:, 2])
         own += self._recovery.diagonal()
         A, B = relative_jacobians(self.poses[:1], self.poses)
-        P: Array = A @ own[0] @ A.swapaxes(1, 2) + B @ own @ B.swapaxes(
-            1, 2
-        )  # they share nothing else: the first is fixed
+        # The first pose is fixed: the others share nothing with it but where its scan stands.
+        P: Array = A @ own[0] @ A.swapaxes(1, 2) + B @ own @ B.swapaxes(1, 2)
         P[0] = 0.0
         return P
 

@@ -55,7 +55,7 @@ def test_covariances_of_all_nodes_are_those_of_the_dense_inverse(P):
 def test_nodes_that_are_appended_one_by_one_have_the_covariance_that_a_new_factor_gives():
     graph = rounds(CORRELATED)
     graph.covariances()
-    for k in range(70):  # more than are appended before a new factor
+    for k in range(70):  # the sixth hangs on a node before the last: only a new factor knows it
         graph.connect(
             len(graph) - 1 - (k == 5),
             graph.add(compose(graph.poses[-1], np.array([0.3, 0, 0.1]))),
