@@ -65,9 +65,8 @@ def search(
     if not len(near) or not len(kept):
         return guess
     low, fine = _grid(kept, cell, max(settings.blur, cell))
-    step = cell / max(
-        1.0, float(np.percentile(np.hypot(*near.T), 80))
-    )  # rad that move far points by one cell
+    far = max(1.0, float(np.percentile(np.hypot(*near.T), 80)))
+    step = cell / far  # rad that move far points by one cell
     turns = step * np.arange(-np.floor(most[2] / step), np.floor(most[2] / step) + 1)
     half = np.ceil(most[:2] / cell / _BLOCK).astype(np.int64)
     unit = np.array([cell, cell, 1.0])
@@ -80,8 +79,11 @@ def search(
 
 
 def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Array]:
-    """Corner (2,) m of a grid around the points, and its scores: 1 at a point, falling off like a Gaussian."""
-    margin = _REACH * blur + _BLOCK * cell
+    """Corner (2,) m of a grid around the points, and its scores: 1 at a point, falling off like a Gaussian.
+
+    The outermost blocks are 0: what lies beyond the grid scores as they do.
+    """
+    margin = _REACH * blur + (_BLOCK + 1) * cell
     low = points.min(axis=0) - margin
     blocks = np.ceil((points.max(axis=0) + margin - low) / cell / _BLOCK).astype(np.int64)
     grid = np.zeros(blocks * _BLOCK, np.float32)
@@ -93,61 +95,98 @@ def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Array]:
 def _splat(points: Array, blur: float, grid: Array) -> None:
     """Largest of the Gaussians around the points, all in cells."""
     reach = int(np.ceil(_REACH * blur))
+    along, across = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
     for k in range(len(points)):
-        u, v = points[k]
-        for i in range(max(int(u) - reach, 0), min(int(u) + reach + 1, grid.shape[0])):
-            for j in range(max(int(v) - reach, 0), min(int(v) + reach + 1, grid.shape[1])):
-                score = np.exp(-((i + 0.5 - u) ** 2 + (j + 0.5 - v) ** 2) / (2 * blur * blur))
-                grid[i, j] = max(grid[i, j], score)
+        i, j = int(points[k, 0]) - reach, int(points[k, 1]) - reach
+        for n in range(2 * reach + 1):
+            along[n] = np.exp(-((i + n + 0.5 - points[k, 0]) ** 2) / (2 * blur * blur))
+            across[n] = np.exp(-((j + n + 0.5 - points[k, 1]) ** 2) / (2 * blur * blur))
+        for m in range(2 * reach + 1):
+            for n in range(2 * reach + 1):
+                grid[i + m, j + n] = max(grid[i + m, j + n], along[m] * across[n])
 
 
+@kernel
 def _blocks(fine: Array) -> Array:
     """Largest score in each block and its next neighbours: what a point of the block can meet within a block's side."""
-    rows, columns = np.array(fine.shape) // _BLOCK
-    own = np.pad(fine.reshape(rows, _BLOCK, columns, _BLOCK).max(axis=(1, 3)), ((0, 1), (0, 1)))
-    largest: Array = np.maximum(
-        np.maximum(own[:-1, :-1], own[1:, :-1]), np.maximum(own[:-1, 1:], own[1:, 1:])
-    )
-    return largest
+    blocks = np.zeros((fine.shape[0] // _BLOCK, fine.shape[1] // _BLOCK), np.float32)
+    for i in range(fine.shape[0]):
+        for j in range(fine.shape[1]):
+            a, b = i // _BLOCK, j // _BLOCK
+            blocks[a, b] = max(blocks[a, b], fine[i, j])
+    for a in range(blocks.shape[0]):
+        for b in range(blocks.shape[1]):
+            for c in range(a, min(a + 2, blocks.shape[0])):
+                for d in range(b, min(b + 2, blocks.shape[1])):
+                    blocks[a, b] = max(blocks[a, b], blocks[c, d])
+    return blocks
 
 
 @kernel
 def _search(fine: Array, blocks: Array, points: Array, window: _Window) -> tuple[float, float, float]:
     """Best shift, in cells, and turn: the bounds of all blocks first, then the blocks from the best bound on."""
-    turns, half, sigma = window.turns, window.half, window.sigma
-    u, v = np.empty(len(points)), np.empty(len(points))
-    bounds = np.empty((len(turns), 2 * half[0] + 1, 2 * half[1] + 1))
-    for t in range(len(turns)):
-        _place(points, window.guess, turns[t], u, v)
-        for a in range(bounds.shape[1]):
-            for b in range(bounds.shape[2]):
-                du, dv = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
-                # The shift of the block that is nearest to the guess has the smallest penalty.
-                penalty = _penalty(
-                    min(max(du, 0), du + _BLOCK - 1), min(max(dv, 0), dv + _BLOCK - 1), turns[t], sigma
-                )
-                bounds[t, a, b] = _score(blocks, u, v, du, dv, _SHIFT) - penalty
-    best, best_u, best_v, best_turn, placed = -np.inf, 0.0, 0.0, 0.0, -1
-    flat = bounds.ravel()
+    turns, half = window.turns, window.half
+    cells = _cells(points, window)
+    bounds = _bounds(blocks, cells, window)
+    flat, scores = bounds.ravel(), np.empty((_BLOCK, _BLOCK))
+    best, best_u, best_v, best_turn = -np.inf, 0, 0, 0.0
     for n in np.argsort(-flat):
         if flat[n] <= best:
             break
-        t, a, b = (
-            n // (bounds.shape[1] * bounds.shape[2]),
-            n // bounds.shape[2] % bounds.shape[1],
-            n % bounds.shape[2],
-        )
-        if t != placed:
-            _place(points, window.guess, turns[t], u, v)
-            placed = t
-        for du in range((a - half[0]) * _BLOCK, (a - half[0] + 1) * _BLOCK):
-            for dv in range((b - half[1]) * _BLOCK, (b - half[1] + 1) * _BLOCK):
-                if _close(window, du, dv, turns[t]):
-                    continue
-                total = _score(fine, u, v, du, dv, 0) - _penalty(du, dv, turns[t], sigma)
-                if total > best:
+        t, block = divmod(n, bounds.shape[1] * bounds.shape[2])
+        a, b = divmod(block, bounds.shape[2])
+        u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
+        _sum_scores(fine, cells[t], u, v, scores)
+        for du in range(u, u + _BLOCK):
+            for dv in range(v, v + _BLOCK):
+                total = scores[du - u, dv - v] - _penalty(du, dv, turns[t], window.sigma)
+                if total > best and not _close(window, du, dv, turns[t]):
                     best, best_u, best_v, best_turn = total, du, dv, turns[t]
     return best_u, best_v, best_turn
+
+
+@kernel
+def _cells(points: Array, window: _Window) -> Ints:
+    """(T, N, 2) cells in which the points lie at the guess, for each turn."""
+    cells, guess = np.empty((len(window.turns), len(points), 2), np.int64), window.guess
+    for t in range(len(window.turns)):
+        c, s = np.cos(guess[2] + window.turns[t]), np.sin(guess[2] + window.turns[t])
+        for k in range(len(points)):
+            x, y = rotate(c, s, points[k, 0], points[k, 1])
+            cells[t, k, 0], cells[t, k, 1] = np.floor(guess[0] + x), np.floor(guess[1] + y)
+    return cells
+
+
+@kernel
+def _bounds(blocks: Array, cells: Ints, window: _Window) -> Array:
+    """(T, A, B) what no shift in a block of shifts exceeds, for each turn and block."""
+    turns, half = window.turns, window.half
+    bounds = np.zeros((len(turns), 2 * half[0] + 1, 2 * half[1] + 1))
+    for t in range(len(turns)):
+        for k in range(cells.shape[1]):
+            i, j = (cells[t, k, 0] >> _SHIFT) - half[0], (cells[t, k, 1] >> _SHIFT) - half[1]
+            for a in range(max(0, -i), min(bounds.shape[1], blocks.shape[0] - i)):
+                for b in range(max(0, -j), min(bounds.shape[2], blocks.shape[1] - j)):
+                    bounds[t, a, b] += blocks[i + a, j + b]
+        for a in range(bounds.shape[1]):
+            for b in range(bounds.shape[2]):
+                u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
+                # The shift of the block that is nearest to the guess has the smallest penalty.
+                du, dv = min(max(u, 0), u + _BLOCK - 1), min(max(v, 0), v + _BLOCK - 1)
+                bounds[t, a, b] -= _penalty(du, dv, turns[t], window.sigma)
+    return bounds
+
+
+@kernel
+def _sum_scores(fine: Array, cells: Ints, u: int, v: int, scores: Array) -> None:
+    """Sums of the scores of points in cells (N, 2), for each shift in the block from (u, v) on; 0 beyond the grid."""
+    scores[:] = 0.0
+    for k in range(len(cells)):
+        i = min(max(cells[k, 0] + u, 0), fine.shape[0] - _BLOCK)
+        j = min(max(cells[k, 1] + v, 0), fine.shape[1] - _BLOCK)
+        for a in range(_BLOCK):
+            for b in range(_BLOCK):
+                scores[a, b] += fine[i + a, j + b]
 
 
 @kernel
@@ -159,26 +198,6 @@ def _close(window: _Window, du: float, dv: float, turn: float) -> bool:
         if away < close[0] * close[0] and abs(others[k, 2] - turn) < close[1]:
             return True
     return False
-
-
-@kernel
-def _score(grid: Array, u: Array, v: Array, du: int, dv: int, shift: int) -> float:
-    """Sum of the scores of points at (u, v) + (du, dv) cells, in a grid of cells 2^shift times as wide."""
-    total = 0.0
-    for k in range(len(u)):
-        i, j = (int(np.floor(u[k])) + du) >> shift, (int(np.floor(v[k])) + dv) >> shift
-        if 0 <= i < grid.shape[0] and 0 <= j < grid.shape[1]:
-            total += grid[i, j]
-    return total
-
-
-@kernel
-def _place(points: Array, guess: Array, turn: float, u: Array, v: Array) -> None:
-    """Points as they lie at a guess that is turned, in cells."""
-    c, s = np.cos(guess[2] + turn), np.sin(guess[2] + turn)
-    for k in range(len(points)):
-        x, y = rotate(c, s, points[k, 0], points[k, 1])
-        u[k], v[k] = guess[0] + x, guess[1] + y
 
 
 @kernel
