@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import UncertainPose, pose_difference, squared_mahalanobis
-from lidarcore.geometry.kernels import compose_with_covariance
+from lidarcore.compiled import kernel
+from lidarcore.geometry import UncertainPose, kernels, pose_difference, squared_mahalanobis
 from lidarcore.mapping.pose_graph import PoseGraph
 
 # Share of the spread with which a loop was expected, up to which the way around tells whether it is true.
@@ -35,10 +35,11 @@ def agree(graph: PoseGraph, a: Loop, b: Loop, gate: float) -> bool:
     Where the way around is known little better than the graph expects the loops, any two would fit: a loop within one
     pass says nothing about a tie to another one.
     """
-    one, P = compose_with_covariance(a.pose, a.covariance, *_relative(graph, a.j, b.j))
-    two, Q = compose_with_covariance(*_relative(graph, a.i, b.i), b.pose, b.covariance)
-    expected = min(spread(_relative(graph, loop.i, loop.j).covariance) for loop in (a, b))
-    return spread(P + Q) < _TELLING * expected and squared(one, two, P + Q) < gate
+    later, earlier = _relative(graph, a.j, b.j), _relative(graph, a.i, b.i)
+    distance, known = _compared(a.pose, a.covariance, *later, *earlier, b.pose, b.covariance)
+    if not distance < gate:
+        return False
+    return known < _TELLING * min(spread(_relative(graph, loop.i, loop.j).covariance) for loop in (a, b))
 
 
 def agreeing(graph: PoseGraph, loop: Loop, others: Sequence[Loop], gate: float) -> list[Loop]:
@@ -66,6 +67,18 @@ def spread(P: Array) -> float:
 def squared(a: Array, b: Array, P: Array) -> float:
     """Squared Mahalanobis distance of two poses (3,)."""
     return float(squared_mahalanobis(pose_difference(a, b), P))
+
+
+@kernel
+def _compared(
+    a: Array, P: Array, later: Array, Q: Array, earlier: Array, R: Array, b: Array, S: Array
+) -> tuple[float, float]:
+    """Squared Mahalanobis distance of a and then `later` from `earlier` and then b, and its standard deviation, m."""
+    one, ahead = kernels.compose_with_covariance(a, P, later, Q)
+    two, behind = kernels.compose_with_covariance(earlier, R, b, S)
+    difference, both = one - two, ahead + behind
+    difference[2] = kernels.wrap(difference[2])
+    return kernels.squared_mahalanobis(difference, both), np.sqrt(max(both[0, 0] + both[1, 1], 0.0))
 
 
 def _relative(graph: PoseGraph, i: int, j: int) -> UncertainPose:
