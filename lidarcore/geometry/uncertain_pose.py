@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from lidarcore.arrays import Array
 from lidarcore.errors import CovarianceError
 from lidarcore.geometry.gaussian import check_covariance
+from lidarcore.geometry.kernels import compose_with_covariance, relative_with_covariance
 from lidarcore.geometry.se2 import (
     compose,
     compose_jacobians,
@@ -19,6 +20,7 @@ from lidarcore.geometry.se2 import (
     wrap,
 )
 
+_INDEPENDENT = np.zeros((3, 3))
 _WEIGHTS = np.linspace(0.0, 1.0, 101)[:, None, None]
 
 
@@ -30,6 +32,8 @@ class UncertainPose(NamedTuple):
 
     def compose(self, T_b_c: "UncertainPose") -> "UncertainPose":
         """T_a_c, the errors of both poses being independent."""
+        if self.pose.ndim == T_b_c.pose.ndim == 1:
+            return UncertainPose(*compose_with_covariance(*_own(self), *_own(T_b_c)))
         F, G = compose_jacobians(self.pose, T_b_c.pose)
         covariance = _carried(F, self.covariance) + _carried(G, T_b_c.covariance)
         return UncertainPose(compose(self.pose, T_b_c.pose), covariance)
@@ -52,6 +56,9 @@ class UncertainPose(NamedTuple):
 
     def relative(self, T_a_c: "UncertainPose") -> "UncertainPose":
         """T_b_c of poses in one frame with independent errors."""
+        if self.pose.ndim == T_a_c.pose.ndim == 1:
+            (pose, own), (seen, other) = _own(self), _own(T_a_c)
+            return UncertainPose(*relative_with_covariance(pose, seen, own, _INDEPENDENT, other))
         A, B = relative_jacobians(self.pose, T_a_c.pose)
         covariance = _carried(A, self.covariance) + _carried(B, T_a_c.covariance)
         return UncertainPose(relative(self.pose, T_a_c.pose), covariance)
@@ -64,6 +71,11 @@ def as_pose_covariance(values: ArrayLike, name: str) -> Array:
         raise CovarianceError(f"{name} has shape {P.shape}: give that of x, y and heading, (3, 3).")
     check_covariance(P, name)
     return P
+
+
+def _own(pose: UncertainPose) -> tuple[Array, Array]:
+    """Copies for a kernel, which is compiled anew for arrays that are read-only or not contiguous."""
+    return np.array(pose.pose, np.float64), np.array(pose.covariance, np.float64)
 
 
 def _carried(J: Array, covariance: Array) -> Array:

@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.compiled import kernel
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import rotation, wrap
+from lidarcore.geometry import rotation
+from lidarcore.geometry.kernels import wrap
 from lidarcore.localization.dead_reckoning import Velocity
 from lidarcore.localization.points import Points
 from lidarcore.scan import Array, Scan
@@ -45,10 +47,8 @@ def deskew(scan: Scan, v: float, w: float, u: float = 0.0) -> Scan:
         raise LocalizationError("The scan has no beam times: without them its distortion cannot be removed.")
     if not np.isfinite([v, w, u]).all():
         raise LocalizationError(f"The speed is {v} and {u} m/s and {w} rad/s: give finite numbers.")
-    moved, turned = _arcs(scan.beam_times, v, w, u)
-    points = moved + scan.ranges * np.exp(1j * (scan.bearings + turned))
-    bearings = np.where(scan.valid, np.angle(points), wrap(scan.bearings + turned))
-    return replace(scan, ranges=np.abs(points), bearings=bearings)
+    ranges, bearings = _carried(scan.ranges, scan.bearings, scan.beam_times, v, w, u)
+    return replace(scan, ranges=ranges, bearings=bearings)
 
 
 def skew(points: Points, times: Array, v: float, w: float, u: float) -> Points:
@@ -59,6 +59,17 @@ def skew(points: Points, times: Array, v: float, w: float, u: float) -> Points:
     return points.with_new(np.stack([seen.real, seen.imag], -1), R @ points.covariance @ R.transpose(0, 2, 1))
 
 
+@kernel
+def _carried(
+    ranges: Array, bearings: Array, times: Array, v: float, w: float, u: float
+) -> tuple[Array, Array]:
+    """Ranges and bearings (N,) of beams measured at times (N,) s on the way, as seen from its beginning."""
+    moved, turned = _arcs(times, v, w, u)
+    points = moved + ranges * np.exp(1j * (bearings + turned))
+    return np.abs(points), np.where(np.isnan(ranges), wrap(bearings + turned), np.angle(points))
+
+
+@kernel
 def _arcs(times: Array, v: float, w: float, u: float) -> tuple[NDArray[np.complex128], Array]:
     """Where the sensor has moved after times (K,) s, as x + iy m, and the angle it has turned, rad."""
     turned = w * times

@@ -18,8 +18,9 @@ def cells(places: Array, normals: Array, size: float, gap: float) -> Ints:
     side = np.floor(np.arctan2(normals[:, 1], normals[:, 0]) / turn + 0.5).astype(np.int64) % _SIDES
     across, along = rotate(-turn * side, places).T
     strip = np.floor(along / size).astype(np.int64)
-    order = np.lexsort([across, strip, side])
-    new = (np.diff(side[order]) != 0) | (np.diff(strip[order]) != 0) | (np.diff(across[order]) > gap)
+    row = (strip - strip.min(initial=0)) * _SIDES + side
+    order = np.lexsort([across, row])
+    new = (np.diff(row[order]) != 0) | (np.diff(across[order]) > gap)
     number = np.empty(len(places), np.int64)
     number[order] = np.concatenate([[0], np.cumsum(new)]) if len(places) else 0
     return number

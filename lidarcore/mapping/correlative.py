@@ -65,7 +65,7 @@ def search(
     if not len(near) or not len(kept):
         return guess
     low, fine = _grid(kept, cell, max(settings.blur, cell))
-    far = max(1.0, float(np.percentile(np.hypot(*near.T), 80)))
+    far = max(1.0, arm(near))
     step = cell / far  # rad that move far points by one cell
     turns = step * np.arange(-np.floor(most[2] / step), np.floor(most[2] / step) + 1)
     half = np.ceil(most[:2] / cell / _BLOCK).astype(np.int64)
@@ -76,6 +76,12 @@ def search(
     window = _Window(centre, half, turns, sigma / unit, others, np.array([_CLOSE / cell, _CLOSE_TURN]))
     found: Array = guess + np.array(_search(fine, _blocks(fine), near / cell, window)) * unit
     return found
+
+
+@kernel
+def arm(points: Array) -> float:
+    """Distance in m by which turning moves the points (N, 2), N > 0: four fifths of them are nearer."""
+    return float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 80))
 
 
 def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Array]:

@@ -1,12 +1,8 @@
 """Keyframes: the scans that make the map, with what is matched and compared of them."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 from lidarcore.arrays import Array
-from lidarcore.geometry import act, rotation
 from lidarcore.mapping.patches import Patches
 from lidarcore.mapping.sight import Sight
 from lidarcore.scan import Scan
@@ -37,11 +33,3 @@ class Keyframes(NamedTuple):
     scans: tuple[Scan, ...]
     poses: Array
     covariances: Array
-
-
-def joined(scans: Sequence[Patches], poses: Array) -> Patches:
-    """The patches of scans at poses (K, 3), together in the frame of the poses."""
-    means = np.concatenate([act(pose, scan.means) for pose, scan in zip(poses, scans, strict=True)])
-    turned = [scan.normals @ rotation(pose[2]).T for pose, scan in zip(poses, scans, strict=True)]
-    rest = (np.concatenate(columns) for columns in zip(*(scan[2:] for scan in scans), strict=True))
-    return Patches(means, np.concatenate(turned), *rest)

@@ -6,8 +6,8 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
-from lidarcore.mapping.correlative import search
-from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.correlative import arm, search
+from lidarcore.mapping.patches import Patches, joined, placed
 from lidarcore.mapping.registration import Registration, information_of, register
 from lidarcore.mapping.settings import FrontSettings
 from lidarcore.mapping.surfels import Surfels, surfels
@@ -27,7 +27,7 @@ class LocalMap:
 
     def __init__(self, settings: FrontSettings) -> None:
         self._settings = settings
-        self._window: deque[tuple[Patches, Array]] = deque(maxlen=settings.keyframes)
+        self._window: deque[Patches] = deque(maxlen=settings.keyframes)  # in the local frame
         self._surfels: Surfels  # of the window
         self._anchor = np.zeros(3)  # T_local_keyframe of the newest
 
@@ -39,17 +39,15 @@ class LocalMap:
         """A keyframe at a pose (3,) from the one before it, or where that is: the map is made anew."""
         if tie is not None:
             self._anchor = compose(self._anchor, tie)
-        self._window.append((seen, self._anchor))
-        scans, poses = zip(*self._window, strict=True)
-        match = self._settings.match
-        self._surfels = surfels(scans, np.array(poses), match.patch, match.reach)
+        self._window.append(placed(seen, self._anchor))
+        self._surfels = surfels(joined(self._window), self._settings.match.patch, self._settings.match.reach)
 
     def registered(self, seen: Patches, guess: UncertainPose) -> Registration:
         """The scan on the local map: from the guess on, and after a search where the guess is vague or does not fit."""
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         prior = information_of(P)
         sigma = np.sqrt(np.diagonal(P))
-        far = np.percentile(np.hypot(*seen.means.T), 80) if len(seen.means) else 0.0
+        far = arm(seen.means) if len(seen.means) else 0.0
         registered = register(self._surfels, seen, x, x, prior, match.reach)
         if registered.inliers < SURE or 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE:
             registered = self._searched(seen, x, sigma, prior, registered)

@@ -12,8 +12,8 @@ from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import chi_square_gate, relative
 from lidarcore.mapping.consistency import Loop, agree, agreeing, spread, squared, support
 from lidarcore.mapping.correlative import search
-from lidarcore.mapping.keyframes import Keyframe, joined
-from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.keyframes import Keyframe
+from lidarcore.mapping.patches import Patches, joined, placed
 from lidarcore.mapping.pose_graph import PoseGraph
 from lidarcore.mapping.registration import Registration, information_of, register
 from lidarcore.mapping.settings import VAGUE, LoopSettings, MatchSettings
@@ -128,7 +128,7 @@ class LoopFinder:
         """What nodes saw together, seen from one of them."""
         kept = self._kept(np.array(nodes))
         poses = relative(self._graph.poses[around], self._graph.poses[kept])
-        return joined([self._keyframes[n].patches for n in kept], poses)
+        return joined([placed(self._keyframes[n].patches, x) for n, x in zip(kept, poses, strict=True)])
 
     def _kept(self, nodes: Ints) -> Ints:
         """Those of the nodes whose scans are still there."""
@@ -141,7 +141,7 @@ class LoopFinder:
         nodes = range(max(0, i - half), min(i + half + 1, k - self._settings.apart))
         match = self._match_settings
         earlier = self._submap(i, nodes)
-        reference = surfels([earlier], np.zeros((1, 3)), match.patch, match.reach)
+        reference = surfels(earlier, match.patch, match.reach)
         mean = relative(self._graph.poses[i], self._graph.poses[k])
         first = self._registered(i, k, mean, P, reference, seen, np.empty((0, 3)))
         if first is None:

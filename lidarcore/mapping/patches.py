@@ -1,13 +1,15 @@
 """A scan as patches: short pieces of its surfaces, each with a normal and with how well it is known across."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
-from lidarcore.geometry import unit_vectors, wrap
+from lidarcore.geometry import act, rotate
 from lidarcore.mapping.settings import MatchSettings
+from lidarcore.mapping.sight import Sight, sight
 from lidarcore.scan import Scan
 
 _LEAST = 3  # points that make a line
@@ -34,21 +36,35 @@ class Patches(NamedTuple):
 
 def patches(scan: Scan, settings: MatchSettings) -> Patches:
     """The patches of a scan; none where fewer than three neighbouring returns make a line."""
-    bearings = wrap(scan.bearings[scan.valid])
-    order = np.argsort(bearings, kind="stable")
-    bearings, ranges = bearings[order], scan.ranges[scan.valid][order]
-    if len(bearings) < _LEAST:
+    seen = sight(scan)
+    if len(seen.bearings) < _LEAST:
         return Patches(np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0))
-    points = ranges[:, None] * unit_vectors(bearings)
-    spacing = float(np.median(np.diff(bearings)))
-    reaches = np.clip(_BEAMS * spacing * ranges, settings.radius, 4 * settings.radius)
     noise = np.array([settings.noise.sigma_range, settings.noise.sigma_bearing]) ** 2
-    single, table = np.empty((2, len(points), _FIELDS))
-    _fit_lines(points, ranges, reaches, settings.gap, noise, single)
-    rows = table[: _gather(single, settings.patch, table)]
+    rows = _rows(seen, settings.radius, settings.gap, settings.patch, noise)
     variances = rows[:, _VARIANCE] + settings.unevenness**2
     means, normals = (rows[:, column : column + 2].copy() for column in (_MEAN, _NORMAL))
     return Patches(means, normals, variances, rows[:, _TILT].copy(), rows[:, _COUNT].copy())
+
+
+def placed(seen: Patches, pose: Array) -> Patches:
+    """Patches of a sensor at a pose (3,), in the frame of the pose."""
+    return seen._replace(means=act(pose, seen.means), normals=rotate(pose[2], seen.normals))
+
+
+def joined(several: Sequence[Patches]) -> Patches:
+    """The patches of several, all in one frame."""
+    return Patches(*(np.concatenate(columns) for columns in zip(*several, strict=True)))
+
+
+@kernel
+def _rows(seen: Sight, radius: float, gap: float, size: float, noise: Array) -> Array:
+    """A table of patches up to `size` m long, from lines through points within `radius` m and a few beams."""
+    ranges, spacing = seen.ranges, np.median(np.diff(seen.bearings))
+    points = np.stack((ranges * np.cos(seen.bearings), ranges * np.sin(seen.bearings)), -1)
+    reaches = np.clip(_BEAMS * spacing * ranges, radius, 4 * radius)
+    single, table = np.empty((len(points), _FIELDS)), np.empty((len(points), _FIELDS))
+    _fit_lines(points, ranges, reaches, gap, noise, single)
+    return table[: _gather(single, size, table)]
 
 
 @kernel

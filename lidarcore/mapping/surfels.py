@@ -1,13 +1,11 @@
 """The patches of several scans as one map of surface elements, with a grid to find them by."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.compiled import kernel
-from lidarcore.geometry import act, rotation
+from lidarcore.compiled import inlined, kernel
 from lidarcore.mapping.cells import cells
 from lidarcore.mapping.patches import Patches
 
@@ -35,14 +33,9 @@ class Surfels(NamedTuple):
     first: Ints
 
 
-def surfels(scans: Sequence[Patches], poses: Array, size: float, cell: float) -> Surfels:
-    """Elements of `size` m from patches of scans at poses (K, 3), to be found within `cell` m."""
-    means = np.concatenate([act(pose, scan.means) for pose, scan in zip(poses, scans, strict=True)])
-    normals = np.concatenate(
-        [scan.normals @ rotation(pose[2]).T for pose, scan in zip(poses, scans, strict=True)]
-    )
-    weights = 1 / np.concatenate([scan.variances for scan in scans])
-    tilts = np.concatenate([scan.tilts for scan in scans])
+def surfels(seen: Patches, size: float, cell: float) -> Surfels:
+    """Elements of `size` m from patches in the frame of the map, to be found within `cell` m."""
+    means, normals, weights = seen.means, seen.normals, 1 / seen.variances
     key = cells(means, normals, size, _GAP)
     order = np.argsort(key, kind="stable")
     starts = np.flatnonzero(np.diff(key[order], prepend=-1))
@@ -51,7 +44,7 @@ def surfels(scans: Sequence[Patches], poses: Array, size: float, cell: float) ->
     def of_cells(values: Array) -> Array:
         return np.add.reduceat(values[order], starts) if len(starts) else values
 
-    total, tilt = of_cells(weights), of_cells(weights * tilts)
+    total, tilt = of_cells(weights), of_cells(weights * seen.tilts)
     mean, normal = (of_cells(weights[:, None] * v) for v in (means, normals))
     length = np.hypot(*normal.T)
     return _sorted(mean / total[:, None], normal / length[:, None], 1 / total, tilt / total / number, cell)
@@ -83,14 +76,22 @@ def _index(at: Ints, first: Ints) -> None:
 @kernel
 def nearest(map: Surfels, x: float, y: float, nx: float, ny: float, reach: float, side: float) -> int:
     """The element nearest to a place whose normal makes a cosine of at least `side` with (nx, ny); -1 if none."""
-    i, j = int(np.floor((x - map.low[0]) / map.cell)), int(np.floor((y - map.low[1]) / map.cell))
     found, closest = -1, reach * reach
-    low, high = max(j - 1, 0), min(j + 2, map.first.shape[1] - 1)
+    left, right = _cells_between(x - reach - map.low[0], x + reach - map.low[0], map.cell, map.first.shape[0])
+    low, high = _cells_between(
+        y - reach - map.low[1], y + reach - map.low[1], map.cell, map.first.shape[1] - 1
+    )
     if low >= high:
         return -1
-    for a in range(max(i - 1, 0), min(i + 2, map.first.shape[0])):
+    for a in range(left, right):
         for k in range(map.first[a, low], map.first[a, high]):
             square = (map.means[k, 0] - x) ** 2 + (map.means[k, 1] - y) ** 2
             if square < closest and map.normals[k, 0] * nx + map.normals[k, 1] * ny > side:
                 found, closest = k, square
     return found
+
+
+@inlined
+def _cells_between(low: float, high: float, cell: float, number: int) -> tuple[int, int]:
+    """First cell, and the one after the last, of those along an axis that reach from low to high."""
+    return max(int(np.floor(low / cell)), 0), min(int(np.floor(high / cell)) + 1, number)

@@ -9,7 +9,7 @@ from lidarcore import Scan
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.correlative import search
-from lidarcore.mapping.patches import patches
+from lidarcore.mapping.patches import joined, patches, placed
 from lidarcore.mapping.registration import linearised, register
 from lidarcore.mapping.surfels import nearest, surfels
 from lidarcore.simulation import furnished_room, random_pose
@@ -21,7 +21,8 @@ ROOM = furnished_room()
 
 def map_of(scans, poses=None):
     poses = np.zeros((len(scans), 3)) if poses is None else poses
-    return surfels([patches(scan, MATCH) for scan in scans], poses, MATCH.patch, MATCH.reach)
+    seen = [placed(patches(scan, MATCH), pose) for scan, pose in zip(scans, poses, strict=True)]
+    return surfels(joined(seen), MATCH.patch, MATCH.reach)
 
 
 @pytest.mark.parametrize("scanned", [full_scan, sick_scan])

@@ -148,7 +148,7 @@ def _registered(reference: Scan, scan: Scan) -> Registration:
     settings, nowhere = MatchSettings(), np.zeros(3)
     A, B = patches(reference, settings), patches(scan, settings)
     start = search(A.means, B.means, nowhere, _APART, settings)
-    elements = surfels([A], nowhere[None], settings.patch, settings.reach)
+    elements = surfels(A, settings.patch, settings.reach)
     return register(elements, B, start, nowhere, information_of(np.diag(_APART**2)), settings.reach)
 
 
