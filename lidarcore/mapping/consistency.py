@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -29,26 +30,41 @@ class Loop:
     quality: float
 
 
-def agree(graph: PoseGraph, a: Loop, b: Loop, gate: float) -> bool:
-    """True if going from a.i by way of a.j to b.j ends where going by way of b.i does, and not just anywhere.
+class Consistency:
+    """Which loops agree with each other, by what a graph says between two of its changes."""
 
-    Where the way around is known little better than the graph expects the loops, any two would fit: a loop within one
-    pass says nothing about a tie to another one.
-    """
-    later, earlier = _relative(graph, a.j, b.j), _relative(graph, a.i, b.i)
-    distance, known = _compared(a.pose, a.covariance, *later, *earlier, b.pose, b.covariance)
-    if not distance < gate:
-        return False
-    return known < _TELLING * min(spread(_relative(graph, loop.i, loop.j).covariance) for loop in (a, b))
+    def __init__(self, graph: PoseGraph, gate: float) -> None:
+        """`gate` is the largest squared Mahalanobis distance of two ways that end at one place."""
+        self._relative, self._gate = cache(graph.relative), gate
+        self._known: dict[tuple[Loop, Loop], bool] = {}
 
+    def agree(self, a: Loop, b: Loop) -> bool:
+        """True if going from a.i by way of a.j to b.j ends where going by way of b.i does, and not just anywhere.
 
-def agreeing(graph: PoseGraph, loop: Loop, others: Sequence[Loop], gate: float) -> list[Loop]:
-    """The loop, and others that all agree with each other, the last ones first."""
-    found = [loop]
-    for other in others[::-1]:
-        if other is not loop and all(agree(graph, other, member, gate) for member in found):
-            found.append(other)
-    return found
+        Where the way around is known little better than the graph expects the loops, any two would fit: a loop within
+        one pass says nothing about a tie to another one.
+        """
+        if (a, b) not in self._known:
+            self._known[a, b] = self._agree(a, b)
+        return self._known[a, b]
+
+    def _agree(self, a: Loop, b: Loop) -> bool:
+        later, earlier = self._way(a.j, b.j), self._way(a.i, b.i)
+        distance, known = _compared(a.pose, a.covariance, *later, *earlier, b.pose, b.covariance)
+        if not distance < self._gate:
+            return False
+        return known < _TELLING * min(spread(self._way(loop.i, loop.j).covariance) for loop in (a, b))
+
+    def agreeing(self, loop: Loop, others: Sequence[Loop]) -> list[Loop]:
+        """The loop, and others that all agree with each other, the last ones first."""
+        found = [loop]
+        for other in others[::-1]:
+            if other is not loop and all(self.agree(other, member) for member in found):
+                found.append(other)
+        return found
+
+    def _way(self, i: int, j: int) -> UncertainPose:
+        return _HERE if i == j else self._relative(i, j)
 
 
 def support(loops: Sequence[Loop]) -> float:
@@ -79,7 +95,3 @@ def _compared(
     difference, both = one - two, ahead + behind
     difference[2] = kernels.wrap(difference[2])
     return kernels.squared_mahalanobis(difference, both), np.sqrt(max(both[0, 0] + both[1, 1], 0.0))
-
-
-def _relative(graph: PoseGraph, i: int, j: int) -> UncertainPose:
-    return _HERE if i == j else graph.relative(i, j)

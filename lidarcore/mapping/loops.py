@@ -10,7 +10,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import chi_square_gate, relative
-from lidarcore.mapping.consistency import Loop, agree, agreeing, spread, squared, support
+from lidarcore.mapping.consistency import Consistency, Loop, spread, squared, support
 from lidarcore.mapping.correlative import search
 from lidarcore.mapping.keyframes import Keyframe
 from lidarcore.mapping.patches import Patches, joined, placed
@@ -83,8 +83,8 @@ class LoopFinder:
             for i, P in self._places(k):
                 if 3 * spread(P) < self._match_settings.max_shift:
                     found += self._hypotheses(i, k, P, seen)
-        self._waiting = found
-        best = max((self._agreeing_with(loop) for loop in found), key=support, default=[])
+        consistency = Consistency(self._graph, self._gate)
+        best = max((consistency.agreeing(loop, found) for loop in found), key=support, default=[])
         rivals = [loop for loop in found if not any(loop is member for member in best)]
         alone = sum(loop.quality for loop in rivals) <= _ALONE * sum(loop.quality for loop in best)
         self._waiting = []
@@ -187,7 +187,8 @@ class LoopFinder:
         way = self._way()
         self._waiting = [loop for loop in self._waiting if way[k] - way[loop.j] < self._settings.memory]
         new = [loop for loop in self._waiting if loop.j == k]
-        sets = [self._agreeing_with(loop) for loop in new]
+        consistency = Consistency(self._graph, self._gate)
+        sets = [consistency.agreeing(loop, self._waiting) for loop in new]
         best = max(sets, key=support)
         P = self._graph.relative(best[0].i, k)[1]
         stretch = np.clip(self._settings.sigmas * spread(P), *self._settings.stretch)
@@ -196,15 +197,12 @@ class LoopFinder:
             return []
         members = {id(loop) for loop in best}
         others = [loop for loop in self._waiting if id(loop) not in members and loop.j in nodes]
-        against = [loop for loop in others if not any(agree(self._graph, loop, b, self._gate) for b in best)]
-        rivals = [self._agreeing_with(loop) for loop in against]
+        against = [loop for loop in others if not any(consistency.agree(loop, b) for b in best)]
+        rivals = [consistency.agreeing(loop, self._waiting) for loop in against]
         if rivals and support(max(rivals, key=support)) > self._settings.rivals * support(best):
             return []
         self._waiting = [loop for loop in self._waiting if id(loop) not in members]
         return best
-
-    def _agreeing_with(self, loop: Loop) -> list[Loop]:
-        return agreeing(self._graph, loop, self._waiting, self._gate)
 
     def _way(self) -> Array:
         """Metres travelled to each node."""

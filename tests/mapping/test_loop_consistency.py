@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarcore.geometry import chi_square_gate, compose, relative
 from lidarcore.mapping import Loop, PoseGraph
-from lidarcore.mapping.consistency import agree, agreeing, support
+from lidarcore.mapping.consistency import Consistency, support
 
 GATE = float(chi_square_gate(0.999, 3))
 TIGHT = np.diag([0.02, 0.02, 0.005]) ** 2
@@ -28,13 +28,13 @@ def loop(i, j, off=(0.0, 0.0, 0.0), quality=0.8):
 
 def test_true_loops_of_two_passes_agree_however_wrong_the_graph_is():
     bent = graph(0.2)
-    assert agree(bent, loop(5, 34), loop(3, 36), GATE)
-    assert agree(bent, loop(3, 36), loop(5, 34), GATE)
+    assert Consistency(bent, GATE).agree(loop(5, 34), loop(3, 36))
+    assert Consistency(bent, GATE).agree(loop(3, 36), loop(5, 34))
 
 
 def test_a_wrong_loop_does_not_agree_with_true_ones():
     """One room along the corridor too far, as a match may have it that mistook one door for another."""
-    assert not agree(graph(), loop(5, 34), loop(3, 36, (3.0, 0, 0)), GATE)
+    assert not Consistency(graph(), GATE).agree(loop(5, 34), loop(3, 36, (3.0, 0, 0)))
 
 
 def test_a_loop_within_one_pass_supports_no_tie_to_another():
@@ -42,8 +42,8 @@ def test_a_loop_within_one_pass_supports_no_tie_to_another():
     vague = graph()
     within = loop(34, 37)
     for wrong in (loop(3, 36), loop(3, 36, (1.0, 0.3, 0.0))):
-        assert not agree(vague, within, wrong, GATE)
-    assert agreeing(vague, loop(3, 36), [within, loop(5, 34)], GATE)[1:] != [within]
+        assert not Consistency(vague, GATE).agree(within, wrong)
+    assert Consistency(vague, GATE).agreeing(loop(3, 36), [within, loop(5, 34)])[1:] != [within]
 
 
 def test_support_counts_the_best_loop_of_each_node():
