@@ -13,20 +13,27 @@ from lidarcore.lines import FITTER_IDS, FITTERS, WORK
 from lidarcore.noise import NoiseModel
 from lidarcore.polar import cos_sin
 from lidarcore.scan import Array, Ints, Scan
-from lidarcore.segmentation import compact, find_pieces, for_pieces, mean_increment, noise_seen
+from lidarcore.segmentation import (
+    Cuts,
+    Pieces,
+    Ring,
+    compact,
+    find_pieces,
+    for_pieces,
+    mean_increment,
+    noise_seen,
+)
 from lidarcore.settings import ExtractionSettings
 from lidarcore.tables import FIELDS
-from lidarcore.walls import fit_pieces
+from lidarcore.walls import Least, fit_pieces
 
 
 class Parameters(NamedTuple):
     """The settings as the kernels take them: variances squared and the angle turned into its sine once."""
 
     noise: NoiseModel
-    split_threshold: float
-    gap: float
-    min_points: float
-    min_length: float
+    cuts: Cuts
+    least: Least
     sin_corner_angle: float
     corner_gap: float
 
@@ -99,10 +106,8 @@ def warm_up() -> None:
 def _parameters(settings: ExtractionSettings) -> Parameters:
     return Parameters(
         settings.noise.model(settings.latent_bearings),
-        settings.split_threshold,
-        settings.gap,
-        float(settings.min_points),
-        settings.min_length,
+        Cuts(settings.split_threshold, settings.gap),
+        Least(float(settings.min_points), settings.min_length),
         float(np.sin(settings.corner_angle)),
         settings.corner_gap,
     )
@@ -116,24 +121,17 @@ def _extract(
 
     A table has rows of segments, then corners; rejections are its last rows, backwards from the end.
     """
-    points, work, beams = floats[:3], floats[3:], indices[0]
-    first, last, seen = _segment(ranges, bearings, settings, points, beams, work[0], indices[1:])
+    ring, work = Ring(floats[:3], indices[0]), floats[3:]
+    pieces, seen = _segment(ranges, bearings, settings, ring, work[0], indices[1:])
     # Of P pieces every one makes a segment or a rejection, and so does every pair of neighbours: 2 P rows are enough.
-    tables, counts = np.empty((len(fitters), 2 * len(first), FIELDS)), np.empty((len(fitters), 3), np.int64)
+    tables, counts = (
+        np.empty((len(fitters), 2 * len(pieces.first), FIELDS)),
+        np.empty((len(fitters), 3), np.int64),
+    )
     for f in range(len(fitters)):
         table, backwards = tables[f], tables[f, ::-1]
         n, rejected = fit_pieces(
-            points,
-            beams,
-            first,
-            last,
-            fitters[f],
-            settings.noise,
-            settings.min_points,
-            settings.min_length,
-            work,
-            table,
-            backwards,
+            ring, pieces, fitters[f], settings.noise, settings.least, work, table, backwards
         )
         counts[f, 0] = n
         counts[f, 1], counts[f, 2] = find_corners(
@@ -147,21 +145,18 @@ def _segment(
     ranges: Array,
     bearings: Array,
     settings: Parameters,
-    points: Array,
-    beams: Ints,
+    ring: Ring,
     scratch: Array,
     indices: Ints,
-) -> tuple[Ints, Ints, float]:
+) -> tuple[Pieces, float]:
     """Beams to points, points to pieces: first and last point of each, and the noise seen in the ranges."""
+    points = ring.points
     cos_sin(bearings, points[1], points[2])
-    n = compact(ranges, points, beams)
+    n = compact(ranges, points, ring.beams)
     seen = noise_seen(points[0, :n], scratch)
     noise = for_pieces(settings.noise, seen)
     increment = mean_increment(bearings)
-    first, last = find_pieces(
-        points, beams, n, noise, settings.split_threshold, settings.gap, increment, scratch, indices
-    )
-    return first, last, seen
+    return find_pieces(ring, n, noise, settings.cuts, increment, scratch, indices), seen
 
 
 class _Buffers(threading.local):

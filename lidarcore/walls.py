@@ -1,12 +1,15 @@
 """Pieces to wall segments: each fitted by the chosen method, or rejected with the reason."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from lidarcore.compiled import inlined
 from lidarcore.lines import fit_piece
 from lidarcore.lines.regression import OK
 from lidarcore.noise import NoiseModel
-from lidarcore.scan import Array, Ints
+from lidarcore.scan import Array
+from lidarcore.segmentation import Pieces, Ring
 from lidarcore.tables import (
     DEGENERATE,
     DISTANCE,
@@ -27,31 +30,36 @@ from lidarcore.tables import (
 _TRIM_FROM = 8  # pieces with fewer points keep their end points
 
 
+class Least(NamedTuple):
+    """What a piece must have to be a wall: points, and length in m."""
+
+    points: float
+    length: float
+
+
 @inlined
 def fit_pieces(
-    points: Array,
-    beams: Ints,
-    first: Ints,
-    last: Ints,
+    ring: Ring,
+    pieces: Pieces,
     fitter: int,
     noise: NoiseModel,
-    min_points: float,
-    min_length: float,
+    least: Least,
     work: Array,
     segments: Array,
     rejections: Array,
 ) -> tuple[int, int]:
     """Write a row for each accepted segment and each rejected piece; their numbers. work is scratch."""
+    points, beams = ring.points, ring.beams
     n_segments = n_rejections = 0
-    for p in range(len(first)):
-        a, b = first[p], last[p]
+    for p in range(len(pieces.first)):
+        a, b = pieces.first[p], pieces.last[p]
         row = segments[n_segments]
         row[FIRST_BEAM], row[LAST_BEAM], row[N_POINTS] = beams[a], beams[b], b - a + 1
         middle = (a + b) // 2
         x, y = points[0, middle] * points[1, middle], points[0, middle] * points[2, middle]
         reason, value, limit = -1, 0.0, 0.0
-        if row[N_POINTS] < min_points:
-            reason, value, limit = TOO_FEW_POINTS, row[N_POINTS], min_points
+        if row[N_POINTS] < least.points:
+            reason, value, limit = TOO_FEW_POINTS, row[N_POINTS], least.points
         else:
             # The end points may belong to a neighbour or to both (mixed pixels): they do not take part in the fit.
             trim = 1 if row[N_POINTS] >= _TRIM_FROM else 0
@@ -64,8 +72,8 @@ def fit_pieces(
                 reason, value = DEGENERATE, status
             else:
                 length = _measure_extent(points, a, b, trim, row)
-                if length < min_length:
-                    reason, value, limit = TOO_SHORT, length, min_length
+                if length < least.length:
+                    reason, value, limit = TOO_SHORT, length, least.length
         if reason < 0:
             n_segments += 1
         else:

@@ -37,9 +37,6 @@ def agreement(
     from dataclasses import asdict
     from json import dumps
 
-    from rich.console import Console
-    from rich.table import Table
-
     from lidarcore import files
     from lidarcore.evaluation.consistency import tables as consistency_tables
     from lidarcore.evaluation.repeatability.tables import finite
@@ -52,6 +49,16 @@ def agreement(
     with counting("pairs of stations") as tell:
         stations = named_stations(recordings, topic, chosen.sensor.mask)
         found = study(stations, chosen.extraction, calibrated=not given, tell=tell)
+    _print(found, by_pair)
+    if output is not None:
+        files.write(output, dumps(finite(asdict(found)), indent=1, allow_nan=False) + "\n")
+
+
+def _print(found: "Agreement", by_pair: bool) -> None:
+    """A row for each kind of claim, and with `by_pair` a line for each pair of stations."""
+    from rich.console import Console
+    from rich.table import Table
+
     table = Table(title="Differences between neighbouring stations", title_justify="left")
     for heading in (
         "claims",
@@ -72,8 +79,6 @@ def agreement(
     if by_pair:
         for name, held in found.systematic.pairs.items():
             console.print(f"{name:40} {found.map.pairs[name]:.3f} {held:.3f}")
-    if output is not None:
-        files.write(output, dumps(finite(asdict(found)), indent=1, allow_nan=False) + "\n")
 
 
 def _cells(found: "Agreement") -> tuple[str, str, str, str]:

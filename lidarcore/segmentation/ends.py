@@ -6,8 +6,9 @@ and beams of the neighbour bend the line; the bearing at which the lines meet do
 
 from lidarcore.compiled import inlined
 from lidarcore.noise import NoiseModel
-from lidarcore.scan import Array, Ints
+from lidarcore.scan import Array
 from lidarcore.segmentation.moments import line_of, moments_of
+from lidarcore.segmentation.pieces import Pieces
 from lidarcore.segmentation.split import variance
 
 _PASSES = 2  # the lines follow their ends: the first pass takes out most of what is the neighbour's
@@ -19,15 +20,15 @@ _STEP_CHI2 = (
 
 @inlined
 def place_ends(
-    points: Array, first: Ints, last: Ints, run: Ints, m: Array, count: int,
-    increment: float, noise: NoiseModel,
-) -> None:  # fmt: skip
+    points: Array, pieces: Pieces, m: Array, count: int, increment: float, noise: NoiseModel
+) -> None:
     """Move each common end of two neighbours in one run to where their lines meet, or to the likeliest step.
 
-    first, last (count,) are changed in place. The moments m (count, MOMENTS) are scratch, and afterwards not those of
-    the pieces: the ends move once more after they were summed up.
+    The first `count` pieces are changed in place. The moments m (count, MOMENTS) are scratch, and afterwards not those
+    of the pieces: the ends move once more after they were summed up.
     increment is the angle between beams, rad.
     """
+    first, last, run = pieces.first, pieces.last, pieces.run
     reach = max(_REACH, int(_REACH_ANGLE / increment))
     for again in range(_PASSES):
         moments_of(points, first, last, m, count, trimmed=again == 0)

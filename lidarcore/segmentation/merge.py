@@ -6,6 +6,7 @@ from lidarcore.compiled import inlined, kernel
 from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
 from lidarcore.segmentation.moments import CHI2, SQUARES, copy, join, residuals
+from lidarcore.segmentation.pieces import Pieces
 
 _MERGE_CHI2 = (
     25.0  # far out for the two or three parameters saved: splits are chosen at extremes, not at random
@@ -13,21 +14,13 @@ _MERGE_CHI2 = (
 
 
 @kernel
-def merge(
-    first: Ints,
-    last: Ints,
-    run: Ints,
-    m: Array,
-    count: int,
-    noise: NoiseModel,
-    cost: Array,
-    chain: Ints,
-) -> int:
+def merge(pieces: Pieces, m: Array, count: int, noise: NoiseModel, cost: Array, chain: Ints) -> int:
     """Merge neighbours in one run while one line explains both, cheapest first; the number of pieces left.
 
-    first, last, run (count,) and moments m (count, MOMENTS) are changed in place; cost (count,), chain (2, count) and
-    the row m[count] are scratch.
+    The first `count` pieces and their moments m (count, MOMENTS) are changed in place; cost (count,), chain (2, count)
+    and the row m[count] are scratch.
     """
+    first, last, run = pieces.first, pieces.last, pieces.run
     joined, before, after = m[count], chain[0], chain[1]
     for i in range(count):
         before[i], after[i] = i - 1, i + 1

@@ -5,6 +5,7 @@ import numpy as np
 from lidarcore.compiled import finite_kernel, inlined, kernel
 from lidarcore.noise import NoiseModel
 from lidarcore.scan import Array, Ints
+from lidarcore.segmentation.pieces import Pieces
 
 _SIGMAS = 3.0  # a point may be this far from the chord by noise
 _CHORD_SHARE = 1.5  # the ends of the chord are noisy too: variance of the distance over that of the point
@@ -18,18 +19,16 @@ def split_runs(
     noise: NoiseModel,
     distance: Array,
     stack: Ints,
-    first: Ints,
-    last: Ints,
-    run: Ints,
+    pieces: Pieces,
 ) -> int:
     """Split every run (starts[k] up to starts[k + 1]) into pieces; the number of pieces, in the order of the ring."""
     count = 0
     for k in range(len(starts) - 1):
         a = starts[k]
-        ends = last[count:]
+        ends = pieces.last[count:]
         n_ends = split(points, a, starts[k + 1] - 1, threshold, noise, distance, stack, ends)
         for e in range(n_ends):
-            first[count + e], run[count + e] = a, k
+            pieces.first[count + e], pieces.run[count + e] = a, k
             a = ends[e] + 1
         count += n_ends
     return count
