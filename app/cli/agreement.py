@@ -9,7 +9,7 @@ from .options import Set, SettingsFile, check_folder, counting, settings_from
 from .stations import named_stations
 
 if TYPE_CHECKING:
-    from lidarcore.evaluation.stations.agreement_study import Agreement
+    from lidarcore.evaluation.stations.agreement_study import Agreement, AgreementStudy
 
 
 def agreement(
@@ -54,7 +54,7 @@ def agreement(
         files.write(output, dumps(finite(asdict(found)), indent=1, allow_nan=False) + "\n")
 
 
-def _print(found: "Agreement", by_pair: bool) -> None:
+def _print(found: "AgreementStudy", by_pair: bool) -> None:
     """A row for each kind of claim, and with `by_pair` a line for each pair of stations."""
     from rich.console import Console
     from rich.table import Table
