@@ -94,31 +94,38 @@ def _measure(url: str, browsers: list[Browser], process: psutil.Process) -> None
         page.locator("#tab-map").click()
         page.locator("#corner-table tbody button").first.dispatch_event("click")
     pages[0].wait_for_timeout(1e3 * SETTLE)
-    sessions = [page.context.new_cdp_session(page) for page in pages]
-    for page, session in zip(pages, sessions, strict=True):
-        _begin(page, session)
     cpu, start = sum(process.cpu_times()[:2]), time.monotonic()
-    pages[0].wait_for_timeout(1e3 * SECONDS)
+    watched = _watched(pages)
     load = 100 * (sum(process.cpu_times()[:2]) - cpu) / (time.monotonic() - start)
     print(f"  {len(pages)} browsers: server {load:.0f} % of a core, machine {psutil.getloadavg()[0]:.1f}")
-    for page, session in zip(pages, sessions, strict=True):
-        _tell(page, session)
+    for ages in watched:
+        sent, drawn = (_spread(list(part)) for part in zip(*ages, strict=True))
+        print(f"    {len(ages) / SECONDS:.1f} frames a second, when sent {sent} ms old, when drawn {drawn}")
+    # Profiled once the ages are known: it takes time that frames would wait for.
+    sessions = [page.context.new_cdp_session(page) for page in pages]
+    for session in sessions:
+        _begin(session)
+    for session, ages in zip(sessions, _watched(pages), strict=True):
+        _tell(session, len(ages))
 
 
-def _begin(page: Page, session: CDPSession) -> None:
-    page.evaluate("window.ages = []")
+def _watched(pages: list[Page]) -> list[list[list[float]]]:
+    """How old each frame of some seconds was when it was sent and drawn, ms, for each page."""
+    for page in pages:
+        page.evaluate("window.ages = []")
+    pages[0].wait_for_timeout(1e3 * SECONDS)
+    return [page.evaluate("window.ages") for page in pages]
+
+
+def _begin(session: CDPSession) -> None:
     session.send("Performance.enable")
     session.send("Profiler.enable")
     session.send("Profiler.setSamplingInterval", {"interval": SAMPLING})
     session.send("Profiler.start")
 
 
-def _tell(page: Page, session: CDPSession) -> None:
-    ages = page.evaluate("window.ages")
+def _tell(session: CDPSession, frames: int) -> None:
     script, costs = _own_work(session.send("Profiler.stop")["profile"])
-    frames = len(ages)
-    sent, drawn = (_spread(list(part)) for part in zip(*ages, strict=True))
-    print(f"    {frames / SECONDS:.1f} frames a second, when sent {sent} ms old, when drawn {drawn}")
     print(f"    own work: {script / 1e3 / frames:.1f} ms of script a frame, of which")
     for name, spent in sorted(costs.items(), key=lambda cost: -cost[1])[:8]:
         print(f"      {spent / 1e3 / frames:.2f} ms {name}")

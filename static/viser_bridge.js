@@ -53,9 +53,16 @@
     const isFree = rotating && !wanted.isTurned;
     const way = wanted.up - view.azimuthAngle;
     const azimuth = view.azimuthAngle + Math.atan2(Math.sin(way), Math.cos(way)); // no whole turns
-    view.minAzimuthAngle = isFree ? -Infinity : azimuth;
-    view.maxAzimuthAngle = isFree ? Infinity : azimuth;
+    limit("minAzimuthAngle", isFree ? -Infinity : azimuth);
+    limit("maxAzimuthAngle", isFree ? Infinity : azimuth);
     if (!isFree && Math.abs(azimuth - view.azimuthAngle) > 1e-6) view.rotateTo(azimuth, view.polarAngle, false);
+  }
+
+  /** Sets a limit of the camera; to set what it is already would draw the scene once more. */
+  function limit(name, value) {
+    const view = controls();
+    const isThere = view[name] === value || Math.abs(view[name] - value) < 1e-9;
+    if (!isThere) view[name] = value;
   }
 
   /** Rotation by dragging, or a map that only pans and zooms; back on the map, the room is fitted again. */
