@@ -1,12 +1,12 @@
 """Maps from whole scans: a front end without odometry, a pose graph that closes loops, honest covariances."""
 
-from lidarcore.mapping.background import MapPicture
-from lidarcore.mapping.consistency import Loop
-from lidarcore.mapping.keyframes import Keyframes
+from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.live.background import MapPicture
+from lidarcore.mapping.live.whole_scans import WholeScans
+from lidarcore.mapping.loops.consistency import Loop
+from lidarcore.mapping.loops.keyframes import Keyframes
 from lidarcore.mapping.mapper import Mapper, Placement
-from lidarcore.mapping.pose_graph import PoseGraph
 from lidarcore.mapping.settings import FrontSettings, LoopSettings, MapperSettings, MatchSettings
-from lidarcore.mapping.whole_scans import WholeScans
 
 __all__ = [
     "FrontSettings",

@@ -7,16 +7,16 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, inverse, relative
-from lidarcore.mapping.back import BackEnd, Snapshot
-from lidarcore.mapping.consistency import Loop
-from lidarcore.mapping.front import FrontEnd
-from lidarcore.mapping.keyframes import Keyframes
-from lidarcore.mapping.motion_smoothing import ScanMotion, half_time, smoothed
-from lidarcore.mapping.pose_graph import PoseGraph
-from lidarcore.mapping.refinement import Refined
+from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.graph.refinement import Refined
+from lidarcore.mapping.live.worker import Worker
+from lidarcore.mapping.loops.back import BackEnd, Snapshot
+from lidarcore.mapping.loops.consistency import Loop
+from lidarcore.mapping.loops.keyframes import Keyframes
+from lidarcore.mapping.matching.front import FrontEnd
+from lidarcore.mapping.matching.motion_smoothing import ScanMotion, half_time, smoothed
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
-from lidarcore.mapping.worker import Worker
 from lidarcore.scan import Scan
 
 _BEHIND = (

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose
-from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.matching.patches import Patches
 from lidarcore.scan import Scan
 
 

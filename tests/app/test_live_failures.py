@@ -70,7 +70,7 @@ def test_a_port_that_another_program_has(live: Server) -> None:
 @pytest.mark.long
 def test_another_baud_rate_is_named(live: Server) -> None:
     with EmulatorProcess(baud=115_200) as other:
-        assert "talks at 115200 baud" in refused(live, 504, {"kind": "device", "port": other.port})
+        assert "uses 115200 baud" in refused(live, 504, {"kind": "device", "port": other.port})
         body = {"kind": "device", "port": other.port, "baud": 115_200, "mode": "Turbo"}
         assert "Turbo" in refused(live, 422, body)
 

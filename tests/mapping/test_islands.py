@@ -10,11 +10,11 @@ from lidarcore import open_recording
 from lidarcore.evaluation.maps.study import prepared, study
 from lidarcore.geometry import compose, pose_difference
 from lidarcore.mapping import MapperSettings, MatchSettings, WholeScans
-from lidarcore.mapping.islands import Islands, moved
-from lidarcore.mapping.keyframes import Keyframe
-from lidarcore.mapping.patches import patches
-from lidarcore.mapping.pose_graph import PoseGraph
-from lidarcore.mapping.sight import sight
+from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.loops.islands import Islands, moved
+from lidarcore.mapping.loops.keyframes import Keyframe
+from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.matching.sight import sight
 from lidarcore.simulation import World
 
 VAGUE = np.diag([1.0, 1.0, 3.0]) ** 2

@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarcore.geometry import chi_square_gate, compose, relative
 from lidarcore.mapping import Loop, PoseGraph
-from lidarcore.mapping.consistency import Consistency, support
+from lidarcore.mapping.loops.consistency import Consistency, support
 
 GATE = float(chi_square_gate(0.999, 3))
 TIGHT = np.diag([0.02, 0.02, 0.005]) ** 2

@@ -137,7 +137,7 @@ def test_what_ends_the_thread_is_told_to_whoever_brings_scans(monkeypatch):
 
     with Mapper(SETTINGS, background=True) as mapper:
         mapper.step(scans[0])
-        monkeypatch.setattr("lidarcore.mapping.back.compose", broken)
+        monkeypatch.setattr("lidarcore.mapping.loops.back.compose", broken)
         with pytest.raises(ZeroDivisionError):
             go_on()
 

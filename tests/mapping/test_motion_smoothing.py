@@ -9,7 +9,7 @@ from lidarcore import SensorNoise
 from lidarcore.evaluation.maps.honesty import drive
 from lidarcore.geometry import compose, pose_difference, relative
 from lidarcore.mapping import Mapper, MapperSettings
-from lidarcore.mapping.motion_smoothing import ScanMotion, smoothed
+from lidarcore.mapping.matching.motion_smoothing import ScanMotion, smoothed
 
 HALF = 0.05  # s
 T = np.arange(40) / 10

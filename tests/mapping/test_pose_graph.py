@@ -7,7 +7,7 @@ from scipy.optimize import least_squares
 from lidarcore.errors import CovarianceError, LocalizationError
 from lidarcore.geometry import compose, inverse, wrap
 from lidarcore.mapping import PoseGraph
-from lidarcore.mapping.edges import edge_errors, linearise
+from lidarcore.mapping.graph.edges import edge_errors, linearise
 
 TRUE = np.array([[2 * np.sin(a), 2 - 2 * np.cos(a), a] for a in np.linspace(0, 1.9 * np.pi, 9)])
 P = np.array([[4, 1, 0.5], [1, 3, -0.2], [0.5, -0.2, 1]]) * 1e-3

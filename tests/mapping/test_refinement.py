@@ -7,10 +7,10 @@ from scipy.stats import chi2
 
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
-from lidarcore.mapping.adjustment import normal_equations
-from lidarcore.mapping.adjustment_cells import Observations
-from lidarcore.mapping.patches import patches
-from lidarcore.mapping.refinement import Step, refine
+from lidarcore.mapping.graph.adjustment import normal_equations
+from lidarcore.mapping.graph.adjustment_cells import Observations
+from lidarcore.mapping.graph.refinement import Step, refine
+from lidarcore.mapping.matching.patches import patches
 from lidarcore.simulation import World, furnished_room
 from lidarcore.simulation.rooms import rectangular_room
 

@@ -8,10 +8,10 @@ from scipy.spatial import cKDTree
 from lidarcore import Scan
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
-from lidarcore.mapping.correlative import search
-from lidarcore.mapping.patches import joined, patches, placed
-from lidarcore.mapping.registration import linearised, register
-from lidarcore.mapping.surfels import nearest, surfels
+from lidarcore.mapping.matching.correlative import search
+from lidarcore.mapping.matching.patches import joined, patches, placed
+from lidarcore.mapping.matching.registration import linearised, register
+from lidarcore.mapping.matching.surfels import nearest, surfels
 from lidarcore.simulation import furnished_room, random_pose
 from lidarcore.simulation.rooms import rectangular_room
 

@@ -6,10 +6,10 @@ import numpy as np
 from mapping_scenes import drive, full_scan, way
 
 from lidarcore.geometry import UncertainPose, relative
-from lidarcore.mapping.back import BackEnd
-from lidarcore.mapping.front import FrontEnd
+from lidarcore.mapping.loops.back import BackEnd
+from lidarcore.mapping.loops.thinning import spare
+from lidarcore.mapping.matching.front import FrontEnd
 from lidarcore.mapping.settings import MapperSettings
-from lidarcore.mapping.thinning import spare
 
 
 def test_of_many_views_the_first_and_the_last_stay():

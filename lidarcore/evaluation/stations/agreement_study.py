@@ -13,10 +13,10 @@ from lidarcore.evaluation.repeatability.feature_set import FeatureSet
 from lidarcore.evaluation.stations.agreement import GATE, Differences, Pair, differences, systematic_part
 from lidarcore.extraction import extract
 from lidarcore.mapping import MatchSettings
-from lidarcore.mapping.correlative import search
-from lidarcore.mapping.patches import patches
-from lidarcore.mapping.registration import Registration, information_of, register
-from lidarcore.mapping.surfels import surfels
+from lidarcore.mapping.matching.correlative import search
+from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.matching.registration import Registration, information_of, register
+from lidarcore.mapping.matching.surfels import surfels
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Scan
 from lidarcore.settings import Covariance, ExtractionSettings

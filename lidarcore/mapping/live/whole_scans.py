@@ -15,11 +15,11 @@ from lidarcore.localization.dead_reckoning import DeadReckoning
 from lidarcore.localization.deskewing import Distortion
 from lidarcore.localization.ekf.estimate import Instant, no_innovation
 from lidarcore.localization.tracking_result import State, goes_on
-from lidarcore.mapping.background import Background, Corrected, MapPicture
-from lidarcore.mapping.front import FrontEnd
 from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.locate_worker import LocateWorker
-from lidarcore.mapping.map_worker import MapWorker
+from lidarcore.mapping.live.background import Background, Corrected, MapPicture
+from lidarcore.mapping.live.locate_worker import LocateWorker
+from lidarcore.mapping.live.map_worker import MapWorker
+from lidarcore.mapping.matching.front import FrontEnd
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import Walls

@@ -10,9 +10,9 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import compose, inverse, pose_difference, relative
+from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.grid.builder import build_grid
-from lidarcore.mapping.keyframes import Keyframe
-from lidarcore.mapping.pose_graph import PoseGraph
+from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.relocation import Relocator, query_of
 
 _TOGETHER = 6  # keyframes that are looked for together, and that an island has at least

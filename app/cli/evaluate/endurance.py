@@ -5,8 +5,8 @@ from typing import Annotated
 
 import typer
 
-from .options import Seed
-from .progress import counted
+from ..options import Seed
+from ..progress import counted
 
 _STRETCHES = 12
 _HEADINGS = (

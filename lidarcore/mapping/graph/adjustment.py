@@ -12,8 +12,8 @@ from scipy.sparse import coo_array, csr_array
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import rotate
-from lidarcore.mapping.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells
 from lidarcore.mapping.cells import cells
+from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells
 
 _GAP = 0.15  # m between two surfaces side by side
 _BEYOND = 1e6  # m between two islands

@@ -8,8 +8,8 @@ from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.geometry.kernels import rotate, wrap
 from lidarcore.mapping.doubt import DOUBTFUL, compiled_trust
-from lidarcore.mapping.patches import Patches
-from lidarcore.mapping.surfels import Surfels, nearest
+from lidarcore.mapping.matching.patches import Patches
+from lidarcore.mapping.matching.surfels import Surfels, nearest
 
 _SIDE = 0.8  # cosine of the largest angle between two surfaces that can be the same one
 _ROUNDS, _CONVERGED = 25, 1e-4  # m and rad

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from ..options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
 
 if TYPE_CHECKING:
     from lidarcore.evaluation.maps.relocation import Attempts

@@ -22,11 +22,11 @@ from lidarcore.geometry import (
     wrap,
 )
 from lidarcore.geometry.kernels import relative_with_covariance
-from lidarcore.mapping.adjustment import NormalEquations, normal_equations
-from lidarcore.mapping.adjustment_cells import Groups, Observations
 from lidarcore.mapping.doubt import DOUBTFUL, trust
-from lidarcore.mapping.patches import Patches
-from lidarcore.mapping.recovery import Recovery, factor
+from lidarcore.mapping.graph.adjustment import NormalEquations, normal_equations
+from lidarcore.mapping.graph.adjustment_cells import Groups, Observations
+from lidarcore.mapping.graph.recovery import Recovery, factor
+from lidarcore.mapping.matching.patches import Patches
 
 _FIXED = 1e12  # information of the first pose
 _SETTLED = 1e-4  # m and rad

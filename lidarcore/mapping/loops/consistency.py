@@ -9,7 +9,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.geometry import UncertainPose, kernels, pose_difference, squared_mahalanobis
-from lidarcore.mapping.pose_graph import PoseGraph
+from lidarcore.mapping.graph.pose_graph import PoseGraph
 
 # Share of the spread with which a loop was expected, up to which the way around tells whether it is true.
 _TELLING = 0.5

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from ..options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
 
 if TYPE_CHECKING:
     from lidarcore import Array
@@ -43,7 +43,7 @@ def evaluate_map(
     from lidarcore.evaluation.maps.accuracy import read_relations
     from lidarcore.evaluation.maps.study import prepared, study
 
-    from .map_run import mapper_settings
+    from ..map_run import mapper_settings
 
     chosen = settings_from(settings, set_)
     verified = None if relations is None else read_relations(relations)

@@ -10,15 +10,15 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import chi_square_gate, relative
-from lidarcore.mapping.consistency import Consistency, Loop, spread, squared, support
-from lidarcore.mapping.correlative import search
-from lidarcore.mapping.keyframes import Keyframe
-from lidarcore.mapping.patches import Patches, joined, placed
-from lidarcore.mapping.pose_graph import PoseGraph
-from lidarcore.mapping.registration import Registration, information_of, register
+from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.loops.consistency import Consistency, Loop, spread, squared, support
+from lidarcore.mapping.loops.keyframes import Keyframe
+from lidarcore.mapping.matching.correlative import search
+from lidarcore.mapping.matching.patches import Patches, joined, placed
+from lidarcore.mapping.matching.registration import Registration, information_of, register
+from lidarcore.mapping.matching.sight import agreement
+from lidarcore.mapping.matching.surfels import Surfels, surfels
 from lidarcore.mapping.settings import VAGUE, LoopSettings, MatchSettings
-from lidarcore.mapping.sight import agreement
-from lidarcore.mapping.surfels import Surfels, surfels
 
 _MARGIN = 0.3  # m by which surfaces may seem to be off where an overlap is guessed
 _CONFLICT = 0.2  # m by which a point must lie before a surface to contradict it

@@ -6,11 +6,11 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
-from lidarcore.mapping.correlative import arm, search
-from lidarcore.mapping.patches import Patches, joined, placed
-from lidarcore.mapping.registration import Registration, information_of, register
+from lidarcore.mapping.matching.correlative import arm, search
+from lidarcore.mapping.matching.patches import Patches, joined, placed
+from lidarcore.mapping.matching.registration import Registration, information_of, register
+from lidarcore.mapping.matching.surfels import Surfels, surfels
 from lidarcore.mapping.settings import FrontSettings
-from lidarcore.mapping.surfels import Surfels, surfels
 
 BLIND = 20  # patches: nothing can be registered on a scan that has fewer
 SURE = 0.6  # share of a scan on the map from which on it needs no search

@@ -10,13 +10,13 @@ import numpy as np
 from lidarcore.errors import GridError, LocalizationError
 from lidarcore.geometry import UncertainPose, pose_difference
 from lidarcore.localization.tracking_result import State
-from lidarcore.mapping.back import BackEnd
-from lidarcore.mapping.background import END_WITHIN, Corrected, MapPicture
 from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
+from lidarcore.mapping.live.background import END_WITHIN, Corrected, MapPicture
+from lidarcore.mapping.live.worker import Worker
+from lidarcore.mapping.loops.back import BackEnd
 from lidarcore.mapping.settings import VAGUE, MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import WallIds, Walls, find_walls
-from lidarcore.mapping.worker import Worker
 from lidarcore.settings import ExtractionSettings
 from lidarcore.threads import FailureLog
 

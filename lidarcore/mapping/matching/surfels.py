@@ -7,7 +7,7 @@ import numpy as np
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import inlined, kernel
 from lidarcore.mapping.cells import cells
-from lidarcore.mapping.patches import Patches
+from lidarcore.mapping.matching.patches import Patches
 
 _GAP = 0.1  # m between two surfaces side by side
 _CELLS = 4_000_000  # of the grid; a map wider than that is cut

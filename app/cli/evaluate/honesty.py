@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Seed, Workers, check_folder
-from .progress import counted
+from ..options import Seed, Workers, check_folder
+from ..progress import counted
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Seed, Workers, check_folder
-from .progress import ForPrograms, counted
+from ..options import Seed, Workers, check_folder
+from ..progress import ForPrograms, counted
 
 if TYPE_CHECKING:
     from lidarcore import SensorNoise

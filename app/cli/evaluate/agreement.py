@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Set, SettingsFile, check_folder, counting, settings_from
+from ..options import Set, SettingsFile, check_folder, counting, settings_from
 from .stations import named_stations
 
 if TYPE_CHECKING:

@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 from lidarcore.arrays import Array
-from lidarcore.mapping.patches import Patches
-from lidarcore.mapping.sight import Sight
+from lidarcore.mapping.matching.patches import Patches
+from lidarcore.mapping.matching.sight import Sight
 from lidarcore.scan import Scan
 
 

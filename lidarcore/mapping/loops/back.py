@@ -7,17 +7,17 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import compose, pose_difference, relative
-from lidarcore.mapping.consistency import Loop
-from lidarcore.mapping.islands import Islands, moved
-from lidarcore.mapping.keyframes import Keyframe
-from lidarcore.mapping.loops import LoopFinder
-from lidarcore.mapping.patches import patches
-from lidarcore.mapping.pose_graph import PoseGraph
-from lidarcore.mapping.refinement import Refined, Step, refine
+from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.graph.refinement import Refined, Step, refine
+from lidarcore.mapping.loops.closure import LoopFinder
+from lidarcore.mapping.loops.consistency import Loop
+from lidarcore.mapping.loops.islands import Islands, moved
+from lidarcore.mapping.loops.keyframes import Keyframe
+from lidarcore.mapping.loops.thinning import spare
+from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.matching.sight import sight
+from lidarcore.mapping.matching.sweep import without
 from lidarcore.mapping.settings import MapperSettings
-from lidarcore.mapping.sight import sight
-from lidarcore.mapping.sweep import without
-from lidarcore.mapping.thinning import spare
 from lidarcore.mapping.tracked import Tracked
 
 _AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map

@@ -1,4 +1,4 @@
-"""The command `lidarcore evaluate`: what each method claims, and what is so."""
+"""Judging ellipses and maps: the commands below `lidarcore evaluate`, gathered."""
 
 import os
 import time
@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..options import RecordingPath, Seed, Set, SettingsFile, Topic, Workers, check_folder, settings_from
+from ..progress import ForPrograms, progress
 from .agreement import agreement
-from .calibration_study import calibration
+from .calibration import calibration
 from .endurance import endurance
-from .evaluate_map import evaluate_map
 from .honesty import honesty
+from .map import evaluate_map
 from .map_studies import relocation, walls
-from .options import RecordingPath, Seed, Set, SettingsFile, Topic, Workers, check_folder, settings_from
-from .progress import ForPrograms, progress
 from .stations import stations
 
 if TYPE_CHECKING:

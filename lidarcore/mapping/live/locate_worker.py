@@ -9,11 +9,11 @@ from lidarcore.arrays import Array
 from lidarcore.errors import LocalizationError
 from lidarcore.geometry import UncertainPose, compose, largest_variance
 from lidarcore.localization.tracking_result import State
-from lidarcore.mapping.background import END_WITHIN, Corrected, MapPicture
+from lidarcore.mapping.live.background import END_WITHIN, Corrected, MapPicture
+from lidarcore.mapping.live.worker import Worker
 from lidarcore.mapping.relocation import Relocation, Relocator, Verdict, query_of
 from lidarcore.mapping.settings import VAGUE
 from lidarcore.mapping.tracked import Tracked
-from lidarcore.mapping.worker import Worker
 from lidarcore.scan import Scan
 from lidarcore.threads import FailureLog
 

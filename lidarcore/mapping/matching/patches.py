@@ -8,8 +8,8 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.geometry import act, rotate
+from lidarcore.mapping.matching.sight import Sight, sight
 from lidarcore.mapping.settings import MatchSettings
-from lidarcore.mapping.sight import Sight, sight
 from lidarcore.scan import Scan
 
 _LEAST = 3  # points that make a line

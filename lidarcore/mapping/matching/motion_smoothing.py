@@ -10,7 +10,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import compose, relative, rotation
-from lidarcore.mapping.sweep import PAUSE, is_swept
+from lidarcore.mapping.matching.sweep import PAUSE, is_swept
 from lidarcore.scan import Scan
 
 _AROUND = np.array(

@@ -16,8 +16,8 @@ from lidarcore.geometry import UncertainPose, as_pose_covariance, relative_jacob
 from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.localization.ekf.estimate import as_pose
 from lidarcore.mapping.doubt import DOUBTFUL
-from lidarcore.mapping.edges import edge_errors, linearise
-from lidarcore.mapping.recovery import Recovery, factor
+from lidarcore.mapping.graph.edges import edge_errors, linearise
+from lidarcore.mapping.graph.recovery import Recovery, factor
 
 _COOLING = 4.0  # by which doubts about new edges set in earlier from round to round
 _FIXED = 1e12  # information of the first pose

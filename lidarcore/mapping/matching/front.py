@@ -7,10 +7,10 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
 from lidarcore.geometry import UncertainPose, relative
-from lidarcore.mapping.local_map import BLIND, SURE, LocalMap
-from lidarcore.mapping.patches import Patches, patches
+from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
+from lidarcore.mapping.matching.patches import Patches, patches
+from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
-from lidarcore.mapping.sweep import NOTHING, PAUSE, Sweep, is_swept, without
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
 

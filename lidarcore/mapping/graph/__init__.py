@@ -1,0 +1,1 @@
+"""The pose graph: poses tied by odometry and loops, their adjustment, and what is known of them."""
