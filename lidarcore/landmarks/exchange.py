@@ -6,6 +6,7 @@ Exchanged are the landmarks as they are; their history and the sessions stay in 
 import csv
 import dataclasses
 import json
+import reprlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -190,11 +191,19 @@ def _objects(reader: JsonReader, key: str) -> Iterator[Row]:
 
 
 def _check_head(head: Row, expected: Row) -> None:
-    if head != expected:
-        says = {name: head.get(name) for name in _HEADER}
+    wrong = [
+        f"{name} should be {value!r} and {_found(head.get(name))}"
+        for name, value in expected.items()
+        if head.get(name) != value
+    ]
+    if wrong:
         raise MapFileError(
-            f"The header is {says} where {_HEADER} is expected: convert the file, or update lidarcore."
+            f"No map of landmarks begins so: {', '.join(wrong)}. Convert the file, or update lidarcore."
         )
+
+
+def _found(value: object) -> str:
+    return "is missing" if value is None else f"is {reprlib.repr(value)}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -325,7 +325,9 @@ def test_file_that_is_no_map_is_refused_in_plain_words(mapped: Visitor) -> None:
     mapped.tolerated.append("422")
     file = {"name": "room.json", "mimeType": "application/json", "buffer": b'{"unit": "mm"}'}
     mapped.page.locator("#map-file").set_input_files(file)
-    expect(mapped.page.locator(".toast.error")).to_contain_text("convert it")
+    expect(mapped.page.locator(".toast.error")).to_contain_text(
+        "unit should be 'm' and is 'mm'. Convert the file"
+    )
 
 
 @pytest.mark.long

@@ -59,6 +59,12 @@ def test_an_angle_is_that_between_the_lines() -> None:
     assert measured.sigma == pytest.approx(np.sqrt(sum(variances)), rel=1e-3)
 
 
+def test_walls_that_face_each_other_are_parallel() -> None:
+    found = extract(room(np.random.default_rng(6)), ExtractionSettings(noise=NOISE))
+    measured = angle(found, nearest(found, "wall", (0.5, 2.2)), nearest(found, "wall", (0.5, -1.8)))
+    assert measured.value < 6 * measured.sigma < 0.1
+
+
 def test_what_cannot_be_measured_says_why() -> None:
     found = extract(room(np.random.default_rng(7)))
     wall, corner = Feature("wall", 0), Feature("corner", 0)
