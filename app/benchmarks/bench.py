@@ -20,6 +20,7 @@ from lidarcore.evaluation.speed.extraction import (
 )
 from lidarcore.evaluation.speed.filter import time_localizer, time_slam
 from lidarcore.evaluation.speed.landmarks import LIMIT_MS
+from lidarcore.evaluation.speed.mapping import MEDIAN_MS, P99_MS, time_front_end
 from lidarcore.evaluation.speed.repeatability import time_repeatability
 
 from .map_load import measure_map_queries
@@ -59,6 +60,7 @@ def run() -> None:
     console.print(_timings("More beams (extract)", time_growth()))
     console.print(_timings("Extended Kalman filter, known map: 3 states, 12 corners", time_localizer()))
     console.print(_slam())
+    console.print(_front_end())
     console.print(_accuracy())
     console.print(_load())
     console.print(_timings("Repeatability: the furnished room, 100 scans, six methods", time_repeatability()))
@@ -99,6 +101,23 @@ def _slam() -> Table:
             f"{times.worst:.2f}",
             f"{times.full:.2f}",
         )
+    return table
+
+
+def _front_end() -> Table:
+    table = _table(
+        "Maps from whole scans: the front end in the simulated office, 920 beams; processor time of one core",
+        "", "median ms", "p99 ms",
+    )  # fmt: skip
+    took, yardstick = time_front_end()
+    median, p99 = np.percentile(yardstick, (50, 99))
+    table.add_row("yardstick: nearest points of two scans, scipy", f"{median:.2f}", f"{p99:.2f}")
+    median, p99 = np.percentile(took, (50, 99))
+    table.add_row(
+        "a scan is placed on the map",
+        _judged(f"{median:.2f} (at most {MEDIAN_MS:g})", median <= MEDIAN_MS),
+        _judged(f"{p99:.2f} (at most {P99_MS:g})", p99 <= P99_MS),
+    )
     return table
 
 

@@ -1,6 +1,6 @@
-"""What extraction, filter and landmark maps cost, beside yardsticks.
+"""What extraction, filter, front end and landmark maps cost, beside yardsticks.
 
 What is public are these modules; each is imported on demand.
 """
 
-__all__ = ["extraction", "filter", "landmarks", "repeatability"]
+__all__ = ["extraction", "filter", "landmarks", "mapping", "repeatability"]
