@@ -23,6 +23,7 @@ REAL = replace(
 """The noise of the papers with every part that real walls and rooms add."""
 MODEL_LIMIT = 1.6  # times the compiled call with simple noise: at most so much it may take with all of it
 BEAMS = 920
+REPEATS = 40
 
 
 FULL_ML = "compiled call, ml, noise with growth, unevenness, resampling, tails"
@@ -122,5 +123,5 @@ def time_calls(what: str, run: Callable[[], object], calls: int, limit: float | 
     """Time `run`, which makes this many calls, over about half a second."""
     run()
     number = max(1, int(0.01 / min(timeit.repeat(run, number=1, repeat=3))))
-    times = np.array(timeit.repeat(run, number=number, repeat=40)) / (number * calls) * 1e6
+    times = np.array(timeit.repeat(run, number=number, repeat=REPEATS)) / (number * calls) * 1e6
     return Timing(what, float(times.min()), float(np.median(times)), limit)
