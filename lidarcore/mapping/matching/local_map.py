@@ -43,13 +43,17 @@ class LocalMap:
         self._surfels = surfels(joined(self._window), self._settings.match.patch, self._settings.match.reach)
 
     def registered(self, seen: Patches, guess: UncertainPose) -> Registration:
-        """The scan on the local map: from the guess on, and after a search where the guess is vague or does not fit."""
+        """The scan on the local map: from the guess on, and after a search where the guess is vague or does not fit.
+
+        Of a scan that lies on the map nearly whole no search could tell a pose that is better by as much as it must be.
+        """
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         prior = information_of(P)
         sigma = np.sqrt(np.diagonal(P))
         far = arm(seen.means) if len(seen.means) else 0.0
         registered = register(self._surfels, seen, x, x, prior, match.reach)
-        if registered.inliers < SURE or 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE:
+        is_vague = 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE
+        if registered.inliers < SURE or (is_vague and registered.inliers + _BETTER < 1):
             registered = self._searched(seen, x, sigma, prior, registered)
         if registered.inliers < SURE:
             registered = self._searched(seen, x, _FURTHER * sigma, prior, registered)
