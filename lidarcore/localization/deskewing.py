@@ -36,18 +36,19 @@ class Distortion:
         return skew(points, times, *self.velocity) if stamp == self.stamp else points
 
 
-def deskew(scan: Scan, v: float, w: float, u: float = 0.0) -> Scan:
+def deskew(scan: Scan, v: float, w: float, u: float = 0.0, acceleration: Velocity = (0.0, 0.0, 0.0)) -> Scan:
     """The scan as a sensor would see it that stands where this one was at `stamp`; it needs beam times.
 
     v m/s ahead, u m/s to the left and w rad/s, constant during the revolution: each point is carried along the arc
-    that the sensor had covered when its beam was measured.
+    that the sensor had covered when its beam was measured. With an acceleration (m/s², rad/s², m/s² of v, w, u) they
+    are the speeds in the mean time of the beams.
     Raises LocalizationError if the scan has no finite beam times, or a speed is not finite.
     """
     if scan.beam_times is None or not np.isfinite(scan.beam_times).all():
         raise LocalizationError("The scan has no beam times: without them its distortion cannot be removed.")
-    if not np.isfinite([v, w, u]).all():
+    if not np.isfinite([v, w, u, *acceleration]).all():
         raise LocalizationError(f"The speed is {v} and {u} m/s and {w} rad/s: give finite numbers.")
-    ranges, bearings = _carried(scan.ranges, scan.bearings, scan.beam_times, v, w, u)
+    ranges, bearings = _carried(scan.ranges, scan.bearings, scan.beam_times, (v, w, u), acceleration)
     return replace(scan, ranges=ranges, bearings=bearings)
 
 
@@ -61,10 +62,13 @@ def skew(points: Points, times: Array, v: float, w: float, u: float) -> Points:
 
 @kernel
 def _carried(
-    ranges: Array, bearings: Array, times: Array, v: float, w: float, u: float
+    ranges: Array, bearings: Array, times: Array, speeds: Velocity, growth: Velocity
 ) -> tuple[Array, Array]:
     """Ranges and bearings (N,) of beams measured at times (N,) s on the way, as seen from its beginning."""
+    (v, w, u), (dv, dw, du) = speeds, growth
     moved, turned = _arcs(times, v, w, u)
+    bend = times * (times / 2 - np.mean(times))
+    moved, turned = moved + (dv + 1j * du) * bend, turned + dw * bend
     points = moved + ranges * np.exp(1j * (bearings + turned))
     return np.abs(points), np.where(np.isnan(ranges), wrap(bearings + turned), np.angle(points))
 

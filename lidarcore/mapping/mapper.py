@@ -126,7 +126,8 @@ class Mapper:
         at, after = smoothed(np.array(self._stamps), at, self._motions)
         for node, number in enumerate(self._numbers):
             old, new = self._motions[number], after[number]
-            self._back.renew(node, new.velocity - old.velocity, new.sweep)
+            more = new.velocity - old.velocity, new.acceleration - old.acceleration
+            self._back.renew(node, *more, new.sweep)
             self._locals[node] = at[number]
         for number, (node, tie) in enumerate(self._ties):
             if number != self._numbers[node]:
@@ -195,4 +196,5 @@ class Mapper:
 
 def _motion_of(tracked: Tracked) -> ScanMotion:
     variances = np.diagonal(tracked.tie.covariance - tracked.sweep)
-    return ScanMotion(half_time(tracked.scan), tracked.velocity, variances, tracked.sweep, tracked.on)
+    half = half_time(tracked.scan)
+    return ScanMotion(half, tracked.velocity, np.zeros(3), variances, tracked.sweep, tracked.on)

@@ -30,7 +30,7 @@ def velocities(t):
 
 
 def motions(removed):
-    return [ScanMotion(HALF, v, np.full(3, 1e-8), np.eye(3), True) for v in removed]
+    return [ScanMotion(HALF, v, np.zeros(3), np.full(3, 1e-8), np.eye(3), True) for v in removed]
 
 
 def test_speeds_and_places_are_found_though_each_scan_was_laid_with_the_speed_before_it():

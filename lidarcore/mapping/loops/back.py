@@ -91,10 +91,10 @@ class BackEnd:
         again += sum(self._close(self._finder.find(node)) for node in range(1, len(self.graph)))
         return again + self._close(self._finder.conclude())
 
-    def renew(self, node: int, velocity: Array, sweep: Array) -> None:
-        """Take a velocity (3,) more out of a keyframe's scan, which then stands where it should within sweep (3, 3)."""
+    def renew(self, node: int, velocity: Array, acceleration: Array, sweep: Array) -> None:
+        """Take more motion (3,) out of a keyframe's scan, which then stands where it should within sweep (3, 3)."""
         keyframe = self.keyframes[node]
-        scan = without(keyframe.scan, velocity)
+        scan = without(keyframe.scan, velocity, acceleration)
         if scan is not keyframe.scan:
             seen = patches(scan, self._settings.front.match)
             self.keyframes[node] = Keyframe(scan, seen, sight(scan), sweep)

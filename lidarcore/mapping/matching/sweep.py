@@ -74,7 +74,10 @@ def is_swept(scan: Scan) -> bool:
     return scan.beam_times is not None and bool(np.isfinite(scan.beam_times).all())
 
 
-def without(scan: Scan, velocity: Array) -> Scan:
-    """The scan as a sensor would see it that stood still, if this one moved at a velocity (3,); the same if unknown."""
-    v, u, w = velocity.tolist()
-    return deskew(scan, v, w, u) if is_swept(scan) else scan
+def without(scan: Scan, velocity: Array, acceleration: Array = _NO_MOTION) -> Scan:
+    """The scan as a sensor would see it that stood still, if this one moved at a velocity (3,); the same if unknown.
+
+    With an acceleration (3,) m/s², m/s², rad/s², the velocity is the one in the mean time of the beams.
+    """
+    (v, u, w), (dv, du, dw) = velocity.tolist(), acceleration.tolist()
+    return deskew(scan, v, w, u, (dv, dw, du)) if is_swept(scan) else scan
