@@ -35,6 +35,27 @@ def test_deskewing_brings_the_corners_back_to_where_they_are() -> None:
     assert errors[1] < 1e-3
 
 
+def test_speeds_that_grow_within_the_revolution_are_taken_out_with_their_acceleration() -> None:
+    """The sensor is integrated in small steps: 1 m/s and 0.5 rad/s in the middle, growing by 2 m/s² and 3 rad/s²."""
+    fine = np.linspace(0, 0.1, 100_001)
+    middle = TIMES.mean()
+    heading = np.interp(TIMES, fine, _integrated(0.5 + 3 * (fine - middle), fine))
+    speed, turned = 1 + 2 * (fine - middle), _integrated(0.5 + 3 * (fine - middle), fine)
+    x, y = (np.interp(TIMES, fine, _integrated(speed * along(turned), fine)) for along in (np.cos, np.sin))
+    ranges, _ = ROOM.cast(np.stack([x, y, heading], -1), BEARINGS)
+    scan = Scan(ranges, BEARINGS, beam_times=TIMES)
+    errors = []
+    for seen in (deskew(scan, 1, 0.5), deskew(scan, 1, 0.5, acceleration=(2, 3, 0))):
+        a, b = np.abs(seen.xy).T
+        errors.append(np.minimum(np.abs(a - 3), np.abs(b - 2)).max())
+    assert errors[0] > 5e-3
+    assert errors[1] < 5e-4
+
+
+def _integrated(values: np.ndarray, times: np.ndarray) -> np.ndarray:
+    return np.concatenate([[0], np.cumsum((values[1:] + values[:-1]) / 2 * np.diff(times))])
+
+
 def test_a_missing_return_stays_missing() -> None:
     ranges = np.full(600, 2.0)
     ranges[100:110] = np.nan
@@ -47,3 +68,5 @@ def test_without_beam_times_it_says_so() -> None:
         deskew(Scan(np.ones(5), BEARINGS[:5]), 1, 0)
     with pytest.raises(LocalizationError, match="finite"):
         deskew(moving_scan(0, 0), np.nan, 0)
+    with pytest.raises(LocalizationError, match="finite"):
+        deskew(moving_scan(0, 0), 0, 0, acceleration=(np.nan, 0, 0))

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
@@ -14,6 +15,11 @@ from lidarcore.scan import Scan
 
 _LEAST = 3  # points that make a line
 _BEAMS = 2.2  # a line reaches at least this many beams' spacing to either side
+_WIDE = (
+    0.01  # rad between beams, about as wide as a beam, from which on hardly one meets both sides of an edge
+)
+_STEP = 0.1  # m by which neighbouring ranges differ at an edge, at least
+_GRAZING = 5.0  # cotangent of the angle at which a wall is met, up to which it is no edge
 _MEAN, _NORMAL, _VARIANCE, _TILT, _COUNT, _FIELDS = 0, 2, 4, 5, 6, 7  # of a table of patches
 
 
@@ -59,12 +65,31 @@ def joined(several: Sequence[Patches]) -> Patches:
 @kernel
 def _rows(seen: Sight, radius: float, gap: float, size: float, noise: Array) -> Array:
     """A table of patches up to `size` m long, from lines through points within `radius` m and a few beams."""
-    ranges, spacing = seen.ranges, np.median(np.diff(seen.bearings))
-    points = np.stack((ranges * np.cos(seen.bearings), ranges * np.sin(seen.bearings)), -1)
+    spacing = np.median(np.diff(seen.bearings))
+    inner = _beside_no_step(seen.ranges, spacing)
+    ranges, bearings = seen.ranges[inner], seen.bearings[inner]
+    points = np.stack((ranges * np.cos(bearings), ranges * np.sin(bearings)), -1)
     reaches = np.clip(_BEAMS * spacing * ranges, radius, 4 * radius)
     single, table = np.empty((len(points), _FIELDS)), np.empty((len(points), _FIELDS))
     _fit_lines(points, ranges, reaches, gap, noise, single)
     return table[: _gather(single, size, table)]
+
+
+@kernel
+def _beside_no_step(ranges: Array, spacing: float) -> NDArray[np.bool_]:
+    """Which returns (N,) are to be used: where range jumps, beams may meet both sides and report something in between.
+
+    All of them where beams lie so far apart that few meet both sides, and each is needed to tell where a side ends.
+    """
+    inner, N = np.ones(len(ranges), np.bool_), len(ranges)
+    if spacing > _WIDE:
+        return inner
+    for i in range(N):
+        j = i + 1 if i + 1 < N else 0
+        most = max(_STEP, _GRAZING * spacing * min(ranges[i], ranges[j]))
+        if abs(ranges[i] - ranges[j]) > most:
+            inner[i] = inner[j] = False
+    return inner
 
 
 @kernel

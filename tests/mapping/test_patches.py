@@ -1,0 +1,35 @@
+"""Patches of a scan against surfaces that are known."""
+
+import numpy as np
+import pytest
+
+from lidarcore import Scan, SensorNoise
+from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.settings import MatchSettings
+
+NEAR, FAR = 2.0, 2.4  # m ahead
+MATCH = MatchSettings(noise=SensorNoise(0.005, 0.001))
+
+
+def scan_of_a_board_before_a_wall(beams: int, between: float) -> Scan:
+    """Beams to a board 1 m wide; the first one beyond either edge reports a range this share of the way to the wall."""
+    bearings = np.linspace(-0.6, 0.6, beams)
+    board = np.abs(NEAR * np.tan(bearings)) < 0.5
+    ahead = np.where(board, NEAR, FAR)
+    first, last = np.flatnonzero(board)[[0, -1]]
+    ahead[[first - 1, last + 1]] = NEAR + between * (FAR - NEAR)
+    return Scan(ahead / np.cos(bearings), bearings)
+
+
+@pytest.mark.parametrize("between", [0.05, 0.15, 0.5, 0.9])
+def test_beams_that_meet_both_sides_of_an_edge_move_no_patch(between: float) -> None:
+    seen = patches(scan_of_a_board_before_a_wall(180, between), MATCH)
+    ahead = seen.means[:, 0]
+    assert (np.abs(ahead - NEAR) < 1e-6).sum() >= 8
+    assert (np.abs(ahead - FAR) < 1e-6).sum() >= 4
+    np.testing.assert_allclose(np.minimum(np.abs(ahead - NEAR), np.abs(ahead - FAR)), 0, atol=1e-6)
+
+
+def test_of_beams_that_lie_far_apart_none_is_left_out() -> None:
+    seen = patches(scan_of_a_board_before_a_wall(70, 1.0), MATCH)
+    assert seen.counts.sum() >= 68 - 4
