@@ -95,14 +95,18 @@ demo: .venv/.run
 .venv/bin/python:
 	$(PYTHON) -m venv .venv || { $(SUDO) apt-get update && $(SUDO) apt-get install -y python3-venv && $(PYTHON) -m venv --clear .venv; }
 
+# The lock files name everything. Asked for dependencies, pip would take the newest release of what a package wants with
+# an extra (`coverage[toml]`), and refuse it as not locked: installing would fail from the day of that release on.
+install := $(bin)/python -m pip install --quiet --disable-pip-version-check --no-deps --require-hashes
+
 .venv/.run: requirements.lock pyproject.toml | .venv/bin/python
-	$(bin)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	$(install) -r requirements.lock
 	@# setuptools warns of folders named like ours; they are ours
 	PYTHONWARNINGS=ignore $(bin)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@touch $@
 
 .venv/.dev: requirements-dev.lock .venv/.run
-	$(bin)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.lock
+	$(install) -r requirements-dev.lock
 	@touch $@
 
 # After a change of the dependencies in pyproject.toml; needs uv.
