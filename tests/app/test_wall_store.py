@@ -154,7 +154,7 @@ def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
     assert gone["history"][-1]["length"] == 5.0
     assert "wall 9" in assert_problem(server.http.get("/walls/9/history", params=kept), 404)["detail"]
     assert_problem(server.http.get("/walls/4/history", params={"session": 99}), 404)
-    assert_problem(server.http.get(f"/walls/{2**70}/history"), 422)
+    assert_problem(server.http.get(f"/walls/{2**70}/history", params=kept), 422)
 
 
 def test_a_run_keeps_its_confirmed_walls_and_says_when_it_has_ended(tmp_path: Path) -> None:
