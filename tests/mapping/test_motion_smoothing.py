@@ -54,6 +54,14 @@ def test_speeds_and_places_are_found_though_each_scan_was_laid_with_the_speed_be
     assert (np.abs(off)[:, [0, 2]] < 3 * claimed[:, [0, 2]]).all()
 
 
+def test_a_pause_makes_no_scan_less_sure_than_the_end_of_a_drive_does():
+    paused = np.where(np.arange(len(T)) < 20, T, T + 30)
+    _, after = smoothed(paused, way(T), motions(velocities(T)))
+    _, ended = smoothed(T[:20], way(T)[:20], motions(velocities(T)[:20]))
+    for one, alone in zip(after, ended, strict=False):
+        np.testing.assert_allclose(one.sweep, alone.sweep, rtol=1e-6, atol=1e-15)
+
+
 def test_scans_that_lie_on_nothing_and_those_taken_at_once_stay_as_they_were():
     given = motions(velocities(T))
     given[7] = given[7]._replace(on=False)

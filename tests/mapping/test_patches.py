@@ -33,3 +33,8 @@ def test_beams_that_meet_both_sides_of_an_edge_move_no_patch(between: float) -> 
 def test_of_beams_that_lie_far_apart_none_is_left_out() -> None:
     seen = patches(scan_of_a_board_before_a_wall(70, 1.0), MATCH)
     assert seen.counts.sum() >= 68 - 4
+
+
+def test_where_every_beam_lies_beside_a_step_there_are_no_patches() -> None:
+    bearings = np.linspace(-0.6, 0.6, 180)
+    assert len(patches(Scan(np.where(np.arange(180) % 2, 2.0, 3.0), bearings), MATCH).means) == 0

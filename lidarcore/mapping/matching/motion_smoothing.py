@@ -101,8 +101,10 @@ def _estimator(t: Array, variances: Array) -> tuple[Array, Array]:
 
 
 def _apart(stamps: Array) -> Array:
-    """Mean time (T,) s between each scan and its neighbours."""
-    return np.gradient(stamps) if len(stamps) > 1 else np.zeros_like(stamps)
+    """Time (T,) s between each scan and the nearer one of its neighbours: a pause says nothing of how speeds change."""
+    gaps = np.concatenate([[np.inf], np.diff(stamps), [np.inf]])
+    nearer: Array = np.minimum(gaps[1:], gaps[:-1])
+    return np.where(np.isfinite(nearer), nearer, 0.0)
 
 
 def _seen_from_within(rates: Array, h: Array) -> Array:

@@ -15,9 +15,7 @@ from lidarcore.scan import Scan
 
 _LEAST = 3  # points that make a line
 _BEAMS = 2.2  # a line reaches at least this many beams' spacing to either side
-_WIDE = (
-    0.01  # rad between beams, about as wide as a beam, from which on hardly one meets both sides of an edge
-)
+_WIDE = 0.01  # rad between beams from which on hardly one meets both sides of an edge
 _STEP = 0.1  # m by which neighbouring ranges differ at an edge, at least
 _GRAZING = 5.0  # cotangent of the angle at which a wall is met, up to which it is no edge
 _MEAN, _NORMAL, _VARIANCE, _TILT, _COUNT, _FIELDS = 0, 2, 4, 5, 6, 7  # of a table of patches
