@@ -25,7 +25,8 @@ class BandsReport:
 class NoiseFound:
     """m, rad and 1/m, as the settings have it; None where it cannot be told and what is set should stay.
 
-    Growth and unevenness that are not seen are 0. The systematic part is none of it: from one place it is never seen.
+    Growth that is not seen is 0; unevenness that is not seen is what rooms usually have of as much as could have been
+    overlooked. The systematic part is none of it: from one place it is never seen.
     """
 
     sigma_range: float | None
@@ -85,7 +86,7 @@ def report(found: Calibration) -> CalibrationReport:
             *_on_sigma("range", found.sigma_range, (1e3, 2, " mm")),
             *_on_sigma("bearing", found.sigma_bearing, (1e3, 2, " mrad"), (math.degrees(1), 3, "°")),
             *_on_precision(found),
-            *_on_unevenness(found.unevenness),
+            *_on_unevenness(found.unevenness, found.noise.unevenness),
             *_on_bands(found.by_range, "distance", "nearby", "far away"),
             *_on_bands(found.by_incidence, "incidence", "that beams meet squarely", "that beams graze"),
             *_on_drift(found.drift, found.sigma_range),
@@ -143,11 +144,12 @@ def _on_precision(found: Calibration) -> list[str]:
     return [f"To know each part to within 15 %, take more scans than these {found.scans}: {parts}."]
 
 
-def _on_unevenness(size: Interval) -> list[str]:
+def _on_unevenness(size: Interval, reckoned_with: float) -> list[str]:
     if size.low > 0:
         return []
     return [
-        f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm."
+        f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm. Since walls "
+        f"seldom are, {_number(reckoned_with, 1e3, 1)} mm are reckoned with."
     ]
 
 

@@ -283,7 +283,7 @@ def test_the_client_calibrates_saves_and_uses(server: Server, standing: Path) ->
         assert robot.calibrate(scans=30)["state"] == "collecting"
         wait_until(lambda: robot.calibration()["state"] == "done", "it is done", 120)
         noise = robot.calibration()["result"]["noise"]
-        robot.save_profile("hall", noise["sigma_range"], noise["sigma_bearing"])
+        robot.save_profile("hall", **noise)
         assert [profile["name"] for profile in robot.profiles()] == ["hall"]
         assert robot.use_profile("hall")["extraction"]["noise"] == asdict(SensorNoise(**noise))
         robot.delete_profile("hall")

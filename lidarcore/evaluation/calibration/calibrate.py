@@ -68,7 +68,7 @@ def calibrate(scans: Iterable[Scan]) -> Calibration:
         unevenness_length=length,
         tails=tails(good, _variance(good, white)),
         renewal=1.0,
-        resampling=0.0 if size.low == 0 else resampling(taken),
+        resampling=resampling(taken),
         by_range=_bands(scatter, scatter.ranges),
         by_incidence=_bands(scatter, scatter.incidence),
         outliers=share(np.asarray(lost, np.float64), np.asarray(all_, np.float64)),

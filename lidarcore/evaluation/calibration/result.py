@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lidarcore.evaluation.calibration.unevenness import usual
+from lidarcore.evaluation.calibration.unevenness import overlooked, usual
 from lidarcore.evaluation.calibration.variances import Bands
 from lidarcore.evaluation.calibration.white import White
 from lidarcore.evaluation.intervals import Interval
@@ -93,8 +93,9 @@ class Calibration:
     def noise_or(self, other: SensorNoise) -> SensorNoise:
         """The calibrated noise, with the values of another one, such as that in use, for what could not be told.
 
-        But not more than could have been overlooked. Growth and unevenness that are not seen are none; the systematic
-        part is never seen by a sensor at rest.
+        But not more than could have been overlooked. Growth that is not seen is none. Unevenness that is not seen is
+        what rooms usually have of as much as could have been overlooked, and none only where no wall was long enough.
+        The systematic part is never seen by a sensor at rest.
         """
         told = self.told
         found = {name: value for name, value in told.items() if value is not None}
@@ -103,6 +104,8 @@ class Calibration:
                 least, _ = _BOUNDS[name]
                 found[name] = max(min(getattr(other, name), self._white[name].high), least)
         nothing = {"range_growth": 0.0, "unevenness": 0.0}
+        if self.unevenness_length is not None and told["unevenness"] is None:
+            nothing["unevenness"], nothing["unevenness_length"] = overlooked(self.unevenness)
         repeated = {"tails": self.tails, "renewal": self.renewal, "resampling": self.resampling}
         return replace(other, **(nothing | found | repeated))
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from lidarcore.evaluation.calibration.wall_beams import WallBeams, medians
 from lidarcore.evaluation.intervals import Interval
@@ -84,6 +85,17 @@ def unevenness(walls: list[Profile], rng: np.random.Generator) -> tuple[Interval
 def usual(size: Interval, length: Interval) -> tuple[float, float]:
     """Size and length (m) to reckon with: what few walls say, drawn to what rooms have by how little it is known."""
     return _drawn_to(size, _SIZE_PRIOR), _drawn_to(length, _LENGTH_PRIOR)
+
+
+def overlooked(size: Interval) -> tuple[float, float]:
+    """Size and length (m) to reckon with where walls may as well be straight, for all that is known.
+
+    The median of what rooms have, of all that is at most the upper end of the interval: a few walls that look straight
+    do not say that they are, many that are seen well do.
+    """
+    value, factor = _SIZE_PRIOR
+    below = float(ndtr(np.log(max(size.high, _SMOOTH) / value) / np.log(factor)))
+    return float(value * factor ** ndtri(below / 2)), _LENGTH_PRIOR[0]
 
 
 def _drawn_to(part: Interval, prior: tuple[float, float]) -> float:
