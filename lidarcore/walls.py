@@ -65,8 +65,9 @@ def fit_pieces(
             trim = 1 if row[N_POINTS] >= _TRIM_FROM else 0
             inside = slice(a + trim, b + 1 - trim)
             rho, c, s = points[0, inside], points[1, inside], points[2, inside]
+            free = (_free(pieces, p - 1, least.points), _free(pieces, p, least.points))
             status = fit_piece(
-                fitter, rho, c, s, noise, (work[0, inside], work[1, inside], work[2, inside]), row
+                fitter, rho, c, s, noise, (work[0, inside], work[1, inside], work[2, inside]), free, row
             )
             if status != OK:
                 reason, value = DEGENERATE, status
@@ -80,6 +81,14 @@ def fit_pieces(
             reject(rejections[n_rejections], reason, beams[a], beams[b], x, y, value, limit)
             n_rejections += 1
     return n_segments, n_rejections
+
+
+@inlined
+def _free(pieces: Pieces, p: int, points: float) -> bool:
+    """Whether no wall follows piece p in its run of points: neither is told by the other where it ends."""
+    if p < 0 or p + 1 >= len(pieces.first) or pieces.run[p] != pieces.run[p + 1]:
+        return True
+    return min(pieces.last[p] - pieces.first[p], pieces.last[p + 1] - pieces.first[p + 1]) + 1 < points
 
 
 @inlined

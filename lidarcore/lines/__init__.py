@@ -12,7 +12,7 @@ from lidarcore.arrays import Array
 from lidarcore.compiled import inlined, kernel
 from lidarcore.errors import DegenerateLineError, ScanError
 from lidarcore.lines import arras_siegwart, cwlf, ml, tls
-from lidarcore.lines.covariance import covariances
+from lidarcore.lines.covariance import Free, covariances
 from lidarcore.lines.line import Line, Lines, normal_angle
 from lidarcore.lines.regression import (
     LINE_CONSISTENT,
@@ -55,8 +55,13 @@ STATUS_MESSAGES = {
 
 
 @inlined
-def fit_piece(fitter: int, rho: Array, c: Array, s: Array, noise: NoiseModel, work: Work, out: Array) -> int:
-    """Fit one piece with the fitter of the given number; work is scratch, out (LINE_FIELDS,) the result."""
+def fit_piece(
+    fitter: int, rho: Array, c: Array, s: Array, noise: NoiseModel, work: Work, free: Free, out: Array
+) -> int:
+    """Fit one piece with the fitter of the given number; work is scratch, out (LINE_FIELDS,) the result.
+
+    free as in `covariances`.
+    """
     w, v_rho, v_theta = work[0], noise.v_rho, noise.v_theta
     if fitter == ARRAS_SIEGWART:
         status, normal, published = arras_siegwart.fit(rho, c, s, v_rho, v_theta, w)
@@ -74,7 +79,7 @@ def fit_piece(fitter: int, rho: Array, c: Array, s: Array, noise: NoiseModel, wo
         return NOT_FINITE
     if status != OK:
         return status
-    consistent, for_maps = covariances(work, rho, c, s, noise, normal, fitter == ML)
+    consistent, for_maps = covariances(work, rho, c, s, noise, normal, fitter == ML, free)
     return store(out, normal, published, consistent, for_maps)
 
 
@@ -145,7 +150,7 @@ def fit_beams(fitter: int, rho: Array, theta: Array, noise: NoiseModel, out: Arr
             return _BAD_BEAM
     rows = np.empty((2 + WORK, len(rho)))
     cos_sin(theta, rows[0], rows[1])
-    return fit_piece(fitter, rho, rows[0], rows[1], noise, (rows[2], rows[3], rows[4]), out)
+    return fit_piece(fitter, rho, rows[0], rows[1], noise, (rows[2], rows[3], rows[4]), (True, True), out)
 
 
 FITTERS: dict[str, Fitter] = {

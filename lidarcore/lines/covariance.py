@@ -20,12 +20,13 @@ _SMOOTHEST = 0.25  # of the variance expected: ranges may also be alike because 
 
 _NOTHING: Sym2 = (0.0, 0.0, 0.0)
 
+Free = tuple[bool, bool]
 Regression = tuple[float, float, float]  # sum of weights, weighted mean of t, centred second moment of t
 
 
 @inlined
 def covariances(
-    work: Work, rho: Array, c: Array, s: Array, noise: NoiseModel, normal: Normal, robust: bool
+    work: Work, rho: Array, c: Array, s: Array, noise: NoiseModel, normal: Normal, robust: bool, free: Free
 ) -> tuple[Sym2, Sym2]:
     """Sandwich covariances of (alpha, r) for a regression with the weights work[0]: of repetition, and of truth.
 
@@ -33,7 +34,7 @@ def covariances(
     and t its coordinate along it; they differ by w only. With A the normal matrix and B the same sum weighted by
     w² v, v the effective variance, the covariance is A^-1 B A^-1. Robust weights of Student's t widen it.
 
-    work is scratch behind the weights.
+    work is scratch behind the weights; free says whether the first and the last end are met by no other wall.
     """
     w = work[0]
     nx, ny, _ = normal
@@ -65,7 +66,7 @@ def covariances(
     if noise.v_wall == 0 and noise.v_systematic == 0:
         here = _at_sensor(white, mean)
         return here, here
-    pattern, elsewhere, roughness, off = _pattern(work, rho, c, s, noise, normal, (a0, mean, d), white)
+    pattern, elsewhere, roughness, off = _pattern(work, rho, c, s, noise, normal, (a0, mean, d), white, free)
     anew = _plus(white, 1.0, pattern)
     same = _plus(white, noise.resampling, elsewhere)
     repeated = _plus(_plus(_NOTHING, (1 - noise.renewal) * roughness, same), noise.renewal, anew)
@@ -99,6 +100,7 @@ def _pattern(
     normal: Normal,
     sums: Regression,
     white: Sym2,
+    free: Free,
 ) -> tuple[Sym2, Sym2, float, tuple[float, float]]:
     """Covariances of (alpha, height over the mean) by this wall's unevenness: of all of it, and of what beams that fall
     elsewhere on it make of it; its roughness; half its length and its middle (m).
@@ -138,7 +140,7 @@ def _pattern(
     pattern = _gained(v_wall, k00, k01, k11, a0, d)
     elsewhere = pattern
     if noise.renewal < 1 and noise.resampling > 0:
-        l00, l01, l11 = resampled_sums(w, t, decay, noise.length)
+        l00, l01, l11 = resampled_sums(w, t, decay, noise.length, free)
         elsewhere = _gained(v_wall, l00, l01, l11, a0, d)
     roughness = max((steps * n / (n - 1) + _ROUGH_WEIGHT) / (n + _ROUGH_WEIGHT), _SMOOTHEST)
     return pattern, elsewhere, roughness, (np.abs(t[n - 1] - t[0]) / 2, (t[n - 1] + t[0]) / 2 + mean)
@@ -151,14 +153,15 @@ def _gained(v: float, k00: float, k01: float, k11: float, a0: float, d: float) -
 
 
 @inlined
-def resampled_sums(w: Array, t: Array, decay: Array, length: float) -> tuple[float, float, float]:
+def resampled_sums(w: Array, t: Array, decay: Array, length: float, free: Free) -> tuple[float, float, float]:
     """The sums of `unevenness_sums`, of what differs if all beams fall elsewhere between their neighbours.
 
     With a = spacing / (2 length), and a shift of all beams that is anywhere within the spacing, the covariance of two
     such samples of one wall is that of the process times sinh(a) / a, but (1 - exp(-a)) / a of a beam with itself. What
     they do not share, summed over the neighbours, is a variance of coth(a) - 1 / a for each beam, independent: a / 3
-    where beams are dense, which hardly miss anything between them, 1 where they are far apart. At either end such a
-    shift also brings beams or takes them away: two there are counted as found anew.
+    where beams are dense, which hardly miss anything between them, 1 where they are far apart. Such a shift also
+    brings a beam at either end or takes it away: it is counted as found anew, and at a free end the one beside it,
+    too. Where two walls meet, both of their lines say where they end, and no more than a beam changes sides.
     """
     n = len(t)
     l00 = l01 = l11 = 0.0
@@ -170,8 +173,8 @@ def resampled_sums(w: Array, t: Array, decay: Array, length: float) -> tuple[flo
         l00 += v
         l01 += v * t[i]
         l11 += v * t[i] * t[i]
-    for i in (0, n - 2):
-        e00, e01, e11 = unevenness_sums(w[i : i + 2], t[i : i + 2], decay[i : i + 2], length)
+    for end in (slice(0, 2 if free[0] else 1), slice(n - (2 if free[1] else 1), n)):
+        e00, e01, e11 = unevenness_sums(w[end], t[end], decay[end], length)
         l00, l01, l11 = l00 + e00, l01 + e01, l11 + e11
     return l00, l01, l11
 

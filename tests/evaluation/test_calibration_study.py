@@ -9,8 +9,10 @@ from typer.testing import CliRunner
 
 from lidarcore import SensorNoise, extract
 from lidarcore.evaluation.calibration.calibrate import calibrate
+from lidarcore.evaluation.calibration.profiles import Profile, profiles
 from lidarcore.evaluation.calibration.true_walls import held
-from lidarcore.evaluation.calibration.unevenness import Profile, unevenness
+from lidarcore.evaluation.calibration.unevenness import unevenness
+from lidarcore.evaluation.calibration.wall_beams import beams_on_walls
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
 from lidarcore.simulation.rooms import rectangular_room
@@ -71,6 +73,17 @@ def test_points_that_average_over_a_piece_of_wall_do_not_make_it_smoother():
     print(size, length)
     assert abs(size.value / 0.004 - 1) < 0.14
     assert 0.05 < length.value < 0.13
+
+
+def test_a_wall_is_as_long_in_its_profile_as_it_is():
+    """The long walls of a 4.5 x 2.5 m room, also where they are seen at a slant: points lie at rho sin(incidence)."""
+    world, rng = rectangular_room(4.5, 2.5), np.random.default_rng(2)
+    sensor, pose = SimulatedSensor(world, NOISE), np.array([1.5, -0.8, 0.3])
+    beams = beams_on_walls([sensor.scan(pose, rng)[0] for _ in range(20)])
+    extents = sorted(np.ptp(wall.t) for wall in profiles(beams, np.full(len(beams.error), 4e-6)))
+    print(extents)
+    assert 2.2 < extents[0] <= extents[1] < 2.5
+    assert 3.9 < extents[2] <= extents[3] < 4.5
 
 
 def test_straight_walls_of_a_small_room_are_no_error():

@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from lidarcore.errors import EvaluationError
+from lidarcore.evaluation.calibration.profiles import Profile, profiles
 from lidarcore.evaluation.calibration.renewal import renewal, resampling
 from lidarcore.evaluation.calibration.result import Calibration
 from lidarcore.evaluation.calibration.roughness import smooth_or_rough
 from lidarcore.evaluation.calibration.systematic import alignment, range_bias, wall_shapes
-from lidarcore.evaluation.calibration.unevenness import Profile, profiles, unevenness
+from lidarcore.evaluation.calibration.unevenness import unevenness
 from lidarcore.evaluation.calibration.variances import Bands, variance_model
 from lidarcore.evaluation.calibration.wall_beams import WallBeams, beams_on_walls
 from lidarcore.evaluation.calibration.white import Scatter, White, tails, white_parts, white_scatter
@@ -43,13 +44,7 @@ def calibrate(scans: Iterable[Scan]) -> Calibration:
         )
     beams = beams_on_walls(taken)
     kept = beams.near()
-    good = beams[kept]
-    drift = _drift(good, len(taken))
-    if drift > STILL:
-        raise EvaluationError(
-            f"A wall moved by {1e3 * drift:.0f} mm from the first scans to the last: calibration needs a sensor that "
-            "stands still, and walls that do."
-        )
+    good, drift = _at_rest(beams[kept], len(taken))
     scatter = white_scatter(good)
     if len(scatter.dof) < LEAST_BINS:
         raise EvaluationError("Too few beams meet walls: give more scans, or a place with longer walls.")
@@ -110,17 +105,32 @@ def _unevenness(scans: list[Scan], white: White) -> tuple[Interval, Interval | N
 
 def _profiles(scans: list[Scan], assumed: float, white: White) -> list[Profile]:
     beams = beams_on_walls(scans, assumed)
-    good = beams[beams.near()]
+    good, _ = _at_rest(beams[beams.near()], len(scans))
     return list(profiles(good, _variance(good, white)))
 
 
-def _drift(beams: WallBeams, scans: int) -> float:
-    """How far (m) the wall that moved most did so, from the first third of the scans to the last."""
-    third = scans // 3
-    early, late = beams.scan < third, beams.scan >= scans - third
-    moved = [
-        abs(float(np.median(beams.error[on & late]) - np.median(beams.error[on & early])))
-        for on in (beams.wall == wall for wall in np.unique(beams.wall))
-        if (on & early).any() and (on & late).any()
-    ]
-    return max(moved, default=0.0)
+def _at_rest(beams: WallBeams, scans: int) -> tuple[WallBeams, float]:
+    """Beams on walls that stay where they are, and how far (m) the one that moved most of these did so.
+
+    A door moves alone, and so does a wall that a person walks past. Raises EvaluationError if half of the beams meet
+    walls that moved: then the sensor did.
+    """
+    walls, of, beams_on = np.unique(beams.wall, return_inverse=True, return_counts=True)
+    moved = np.array([_moved(beams[beams.wall == wall], scans) for wall in walls])
+    at_rest = moved <= STILL
+    if 2 * beams_on[at_rest].sum() <= len(of):
+        raise EvaluationError(
+            f"{int((~at_rest).sum())} of {len(moved)} walls moved from the first scans to the last, one by "
+            f"{1e3 * moved.max():.0f} mm: calibration needs a sensor that stands still."
+        )
+    still = beams[at_rest[of]]
+    numbered = np.unique(still.bin, return_inverse=True)[1].astype(np.int64)
+    return replace(still, bin=numbered), float(moved[at_rest].max())
+
+
+def _moved(wall: WallBeams, scans: int) -> float:
+    """How far (m) one wall moved from the first third of the scans to the last; 0 if it was not seen in both."""
+    early, late = wall.scan < scans // 3, wall.scan >= scans - scans // 3
+    if not (early.any() and late.any()):
+        return 0.0
+    return abs(float(np.median(wall.error[late]) - np.median(wall.error[early])))

@@ -1,7 +1,5 @@
 """What of a wall's unevenness the next scan from the same place does not repeat."""
 
-from itertools import pairwise
-
 import numpy as np
 
 from lidarcore.evaluation.repeatability.wall_tracker import WallTracker, told_near
@@ -18,6 +16,7 @@ _WINDOW = 100  # scans: what drifts for longer is not noise
 _SETTLING = (
     10  # scans after a start, of real sensors: walls lie four times as far off as later, and then no more
 )
+_LAGS = 8  # scans apart, at which bearings are compared
 
 _STEPS = np.linspace(0.0, 1.0, 21)
 
@@ -61,9 +60,16 @@ def _weighted_median(values: Array, weights: Array) -> float:
 def resampling(scans: list[Scan]) -> float:
     """How far beams fall elsewhere from scan to scan: 0 on the same bearings, 1 anywhere between their neighbours.
 
-    Twelve times the mean square of the shift over the spacing, which is 1 for a shift that is anywhere.
+    Twelve times the mean square of the shift over the spacing, which is 1 for a shift that is anywhere. Scans close to
+    each other and far apart are compared: where bearings creep, the next scan repeats nearly all of them, a later one
+    none.
     """
-    squares = [_shifts(before.bearings, after.bearings) ** 2 for before, after in pairwise(scans)]
+    apart = np.unique(np.linspace(1, min(len(scans), _WINDOW) - 1, _LAGS).astype(int)).tolist()
+    squares = [
+        _shifts(before.bearings, after.bearings) ** 2
+        for lag in apart
+        for before, after in zip(scans, scans[lag:], strict=False)
+    ]
     return min(float(12 * np.mean(np.concatenate(squares))), 1.0)
 
 

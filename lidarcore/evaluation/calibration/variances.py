@@ -101,15 +101,22 @@ def _maximum_likelihood(sample: _Sample) -> Array:
         for size in sizes
         for share in (0.0, 0.5, 1.0)
     ]
-    best, *others = (_ascend(sample, start) for start in starts)
+    reached = [beta for start in starts if (beta := _ascend(sample, start)) is not None]
+    if not reached:
+        raise EvaluationError(
+            "The noise cannot be determined: no sigma_range and sigma_bearing fit the scatter of the ranges."
+        )
+    best, *others = reached
     for beta in others:
         if sample.gain(sample.expected(beta), sample.expected(best)) > 0:
             best = beta
     return best
 
 
-def _ascend(sample: _Sample, beta: Array) -> Array:
+def _ascend(sample: _Sample, beta: Array) -> Array | None:
     """Fisher scoring among beta >= 0, its steps halved until the likelihood grows, so that it cannot run in circles.
+
+    None if it does not arrive.
 
     A whole step is least squares with weights dof / (2 v²), v from the step before. It lowers a convex form that has
     the slope of the likelihood, so the likelihood grows at its beginning, unless beta is a maximum.
@@ -127,9 +134,7 @@ def _ascend(sample: _Sample, beta: Array) -> Array:
                 break
             step, promised = step / 2, promised / 2
         beta = beta + step
-    raise EvaluationError(
-        "The noise cannot be determined: no sigma_range and sigma_bearing fit the scatter of the ranges."
-    )
+    return None
 
 
 def _sandwich(sample: _Sample, beta: Array) -> Array:

@@ -128,7 +128,14 @@ def _fit_known(
                     row = fitted[side, f]
                     # Inlined, not a kernel called: linked copies of one may round differently from process to process.
                     fit = fit_piece(
-                        f, rho[a:b], c[a:b], s[a:b], noise, (work[0, a:b], work[1, a:b], work[2, a:b]), row
+                        f,
+                        rho[a:b],
+                        c[a:b],
+                        s[a:b],
+                        noise,
+                        (work[0, a:b], work[1, a:b], work[2, a:b]),
+                        (True, True),
+                        row,
                     )
                     status[side, f] = NOT_FINITE if behind else fit
             for f in range(fitters):
