@@ -5,7 +5,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from typing import Any
 
 from serving import ROOT
@@ -45,9 +44,7 @@ class Serving:
             self.said += line
         raise AssertionError(self.process.communicate())
 
-    def end(self, number: int = signal.SIGINT) -> tuple[float, str]:
-        """Press Ctrl-C, or send another signal; how long it takes to end, and what it says about it."""
-        started = time.perf_counter()
+    def end(self, number: int = signal.SIGINT) -> str:
+        """Press Ctrl-C, or send another signal; what it says about it. It has a minute to end, on a busy machine, too."""
         self.process.send_signal(number)
-        _, said = self.process.communicate(timeout=60)
-        return time.perf_counter() - started, said
+        return self.process.communicate(timeout=60)[1]

@@ -181,8 +181,7 @@ def test_serve_prints_its_address_plays_the_recording_and_ends_on_ctrl_c(
     with httpx.Client(base_url=f"{server.url}api/v1", timeout=60) as http:
         assert http.get("/source").json()["recording"] == "given.npz"
         assert http.get("/settings").json()["extraction"]["fitter"] == "cwlf"
-    seconds, said = server.end()
-    assert seconds < 20
+    said = server.end()
     assert said == ""
     assert server.process.returncode == 0
 
