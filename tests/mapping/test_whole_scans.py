@@ -12,6 +12,7 @@ from lidarcore.geometry import relative, wrap
 from lidarcore.localization import TrackingResult
 from lidarcore.mapping import WholeScans
 from lidarcore.scan import Array, Scan
+from lidarcore.simulation import SimulatedSensor, furnished_room
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
@@ -55,6 +56,16 @@ def test_a_robot_that_drives_through_two_rooms_is_tracked_all_the_way(
     print(error, np.sqrt(np.diag(last.covariance)))
     assert np.hypot(*error[:2]) < 0.1
     assert error @ np.linalg.solve(last.covariance, error) < chi2.isf(1e-6, 3)
+
+
+def test_a_sensor_at_rest_stays_there_where_its_scans_arrive_late(slam: WholeScans) -> None:
+    """Held up for a second and a half, then one upon another. By stamps a millisecond apart it moved 3 to 6 m."""
+    rng, sensor, stamp = np.random.default_rng(0), SimulatedSensor(furnished_room()), 0.0
+    for k in range(120):
+        scan, _ = sensor.scan(np.array([0.5, 0.3, 0.4]), rng, stamp)
+        found = slam.step(slam.deskewed(scan))
+        assert np.hypot(*found.estimate.pose[:2]) < 0.01
+        stamp += (0.1, 1.5, 0.001, 0.001, 0.001, 0.002, 0.1)[k % 7]
 
 
 def test_the_map_goes_on_after_a_pause_in_which_the_robot_drove_on(

@@ -20,6 +20,7 @@ from lidarcore.mapping.live.background import Background, Corrected, MapPicture
 from lidarcore.mapping.live.locate_worker import LocateWorker
 from lidarcore.mapping.live.map_worker import MapWorker
 from lidarcore.mapping.matching.front import FrontEnd
+from lidarcore.mapping.matching.sweep import elapsed
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import Walls
@@ -167,7 +168,7 @@ class WholeScans:
     def _move(self, scan: Scan, tracked: Tracked) -> None:
         """Remember how the sensor moved, which no bend of the map changes: the next scan is deskewed by that."""
         self._velocity = None
-        if self._before is not None and 0 < (dt := scan.stamp - self._before) <= _PAUSE:
+        if self._before is not None and 0 < (dt := elapsed(scan, self._before)) <= _PAUSE:
             x, y, turn = (relative(self._tie.pose, tracked.tie.pose) / dt).tolist()
             self._velocity = x, turn, y
         self._before = scan.stamp

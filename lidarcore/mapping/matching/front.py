@@ -9,7 +9,7 @@ from lidarcore.errors import MotionError
 from lidarcore.geometry import UncertainPose, relative
 from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
 from lidarcore.mapping.matching.patches import Patches, patches
-from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, is_swept, without
+from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, elapsed, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
@@ -129,9 +129,9 @@ class FrontEnd:
         """Seconds since the last scan, and the motion: by odometry, else as before."""
         assert self._before is not None
         s, (stamp, odometry) = self._settings, self._before
-        dt = scan.stamp - stamp
-        if dt < 0:
-            raise MotionError(f"The clock went back by {-dt:g} s: leave the scan out, or begin a new map.")
+        if (back := stamp - scan.stamp) > 0:
+            raise MotionError(f"The clock went back by {back:g} s: leave the scan out, or begin a new map.")
+        dt = elapsed(scan, stamp)
         if scan.odometry is None or odometry is None:
             change = max(dt, self._period) * np.array([s.speed_change, s.speed_change, s.turn_change])
             return dt, UncertainPose(self._motion, np.diag(change**2) + _FLOOR)

@@ -69,6 +69,16 @@ class Sweep:
         return scan
 
 
+def elapsed(scan: Scan, before: float) -> float:
+    """Time (s) since the scan with the stamp `before`, but no less than the scan itself took.
+
+    Scans that were held up arrive one upon another, with stamps too close together: by these a sensor at rest would be
+    metres per second fast.
+    """
+    took = float(np.ptp(scan.beam_times)) if scan.beam_times is not None and is_swept(scan) else 0.0
+    return max(scan.stamp - before, took)
+
+
 def is_swept(scan: Scan) -> bool:
     """Whether its beams have times."""
     return scan.beam_times is not None and bool(np.isfinite(scan.beam_times).all())
