@@ -93,6 +93,18 @@ def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     expect(phone.page.frame_locator("#scene").get_by_text("Connected")).to_be_hidden()
 
 
+def test_what_is_selected_elsewhere_leaves_the_tabs_of_a_phone_free(phone: Visitor) -> None:
+    corner = phone.server.pause()["corners"][0]["id"]
+    phone.server.api.put("selection", json={"corner": corner}).raise_for_status()
+    card = phone.page.get_by_role("complementary", name="Inspector")
+    expect(card).to_be_visible()
+    tabs = phone.page.get_by_role("tablist").bounding_box()
+    assert card.bounding_box()["y"] >= tabs["y"] + tabs["height"]
+    phone.page.get_by_role("tab", name="Setup").tap()
+    card.get_by_role("button", name="Fold the inspector").tap()
+    expect(phone.page.get_by_label("Fitter")).to_be_in_viewport()
+
+
 @pytest.mark.long
 def test_narrow_page_plays_and_selects(phone: Visitor) -> None:
     phone.page.get_by_role("button", name="Pause").tap()
