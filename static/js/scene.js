@@ -4,7 +4,7 @@
 import { $ } from "./dom.js";
 import { setting, toggleSetting } from "./actions.js";
 import { Fading } from "./overlay/fading.js";
-import { framingOf, isFramed } from "./overlay/framing.js";
+import { framingOf, including, isFramed } from "./overlay/framing.js";
 import { Look, PlainCamera } from "./overlay/look.js";
 import { letGo } from "./overlay/tools.js";
 import { get, on } from "./store.js";
@@ -47,7 +47,7 @@ export function mountScene(press) {
     requestAnimationFrame(() => setTimeout(() => ($("scene").src = "viser/")));
     stop();
   });
-  on(["frame", "tools"], look);
+  for (const key of ["frame", "tools", "mapped", "landmarks"]) on([key], look);
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
     if (ours) handlers.get(data?.type)?.(data);
@@ -72,8 +72,17 @@ function look() {
 
 function framed(frame) {
   if (!frame) return undefined;
-  const framing = framingOf(frame.extent, frame.localization?.pose, get("tools"), sheetNow());
-  return { ...framing, isFramed: isFramed(frame.extent, lookNow(), sheetNow()) };
+  const extent = extentOf(frame);
+  const framing = framingOf(extent, frame.localization?.pose, get("tools"), sheetNow());
+  return { ...framing, isFramed: isFramed(extent, lookNow(), sheetNow()) };
+}
+
+/** What is to be seen: what the scan sees, and all of the map, unless the view goes along with the sensor. */
+function extentOf({ extent, localization }) {
+  if (!localization || get("tools").follow) return extent;
+  const walls = get("mapped").walls.flatMap(({ ends }) => ends);
+  const landmarks = [...(get("landmarks")?.values() ?? [])].map(({ x, y }) => [x, y]);
+  return including(extent, [...walls, ...landmarks]);
 }
 
 let sheet = null; // as it was measured last

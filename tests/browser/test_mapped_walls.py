@@ -124,6 +124,18 @@ def test_pointing_at_a_wall_of_the_map_says_what_it_is(look: Callable[..., Visit
     assert f"seen in {wall['count']} keyframes since" in text
 
 
+def test_all_walls_of_the_map_are_in_the_view_beside_the_legend(
+    look: Callable[..., Visitor], mapped: Server
+) -> None:
+    visitor = look(1400, 900)
+    stage, legend = (visitor.page.locator(name).bounding_box() for name in ("#stage", "#legend"))
+    places = np.array(
+        [visitor.pixel_at(place) for wall in walls(mapped) for place in (wall["start"], wall["end"])]
+    )
+    assert (places > [legend["x"] + legend["width"], stage["y"]]).all()
+    assert (places < [stage["x"] + stage["width"], stage["y"] + stage["height"]]).all()
+
+
 def test_a_click_tells_all_of_a_wall_and_what_it_was(look: Callable[..., Visitor], mapped: Server) -> None:
     visitor, wall = look(), seen_often(mapped)[0]
     visitor.page.mouse.click(*visitor.pixel_at(off_middle(wall)))

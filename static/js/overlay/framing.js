@@ -36,6 +36,10 @@ export function isFramed(extent, look, { left, right, top, bottom, width, height
   return isInside && spans.some(([low, high], axis) => high - low > SMALL * (free[axis][1] - free[axis][0]));
 }
 
+/** An extent that holds some places, too. */
+export const including = (extent, places) =>
+  extent.map((ends, axis) => [Math.min, Math.max].map((end, at) => end(ends[at], ...places.map((place) => place[axis]))));
+
 const cornersOf = ([xs, ys]) => xs.flatMap((x) => ys.map((y) => [x, y]));
 
 /** The directions to the right and up on the screen, where `up` (rad) is up. */
