@@ -99,7 +99,9 @@ def number(text: str) -> float:
 def test_slam_is_switched_on_and_landmarks_appear(map_page: Visitor) -> None:
     page, server = map_page.page, map_page.server
     page.get_by_role("tab", name="Map").click()
-    expect(page.locator("#pose-panel")).to_be_hidden()
+    layers = page.locator("#navigation").get_by_role("group", name="Layers")
+    for part in (page.locator("#pose-panel"), layers, page.get_by_role("button", name="Set pose")):
+        expect(part).to_be_hidden()
     page.locator("#navigation .segments label", has_text="Corners").first.click()
     page.locator("#navigation .segments label", has_text="SLAM").click()
     expect(page.locator("#pose-panel-state")).to_have_text("Tracking")
