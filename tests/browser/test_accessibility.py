@@ -93,6 +93,15 @@ def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     expect(phone.page.frame_locator("#scene").get_by_text("Connected")).to_be_hidden()
 
 
+def test_a_phone_on_its_side_has_the_panel_beside_the_view(visit: Callable[..., Visitor]) -> None:
+    page = visit(844, 390, has_touch=True, is_mobile=True).open().page
+    page.get_by_role("tab", name="Setup").tap()
+    view, panel = (page.locator(name).bounding_box() for name in ("#stage", "#setup"))
+    assert view["x"] + view["width"] <= panel["x"]
+    assert min(view["height"], panel["height"]) > 390 / 2
+    assert panel["y"] + panel["height"] <= 390
+
+
 def test_what_is_selected_elsewhere_leaves_the_tabs_of_a_phone_free(phone: Visitor) -> None:
     corner = phone.server.pause()["corners"][0]["id"]
     phone.server.api.put("selection", json={"corner": corner}).raise_for_status()
