@@ -74,7 +74,7 @@ function framed(frame) {
   if (!frame) return undefined;
   const extent = extentOf(frame);
   const framing = framingOf(extent, frame.localization?.pose, get("tools"), sheetNow());
-  return { ...framing, isFramed: isFramed(extent, lookNow(), sheetNow()) };
+  return { ...framing, isFramed: isFramed(extent, lookNow(), get("tools"), sheetNow()) };
 }
 
 /** What is to be seen: what the scan sees, and all of the map, unless the view goes along with the sensor. */
