@@ -19,11 +19,11 @@ const READOUTS = [
     text: (now) => `${fixed(rateOf(now), 1)}\u2009Hz`,
   },
   { key: "corners", label: "Corners", text: ({ frame }) => frame.corners.length },
-  { key: "segments", label: "Segments", text: ({ frame }) => frame.segments[frame.fitter]?.length ?? 0 },
+  { key: "segments", label: "Walls", text: ({ frame }) => frame.segments[frame.fitter]?.length ?? 0 },
   {
     key: "extract",
     label: "Extraction",
-    hint: "Time to find segments and corners in this scan",
+    hint: "Time to find walls and corners in this scan",
     text: ({ frame }) => microseconds(frame.timings.extract_us),
   },
   {

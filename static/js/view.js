@@ -18,13 +18,14 @@ const OF_MAP = { pose: "", trail: "", dead_reckoned: "", truth: "", occupancy: "
 
 /** What layers are called here and in the legend, where their key would not say it. */
 const NAMES = {
-  pose: "Position", trail: "Estimated path", dead_reckoned: "Odometry path", truth: "True path", associations: "Matches",
+  segments: "Walls", pose: "Position", trail: "Estimated path", dead_reckoned: "Odometry path", truth: "True path",
+  walls: "Walls of the map", associations: "Matches",
 };
 
 const narrow = matchMedia("(max-width: 1199px)"); // where the room needs the place
 
 const FADES = [[0, "None"], [5, "The last 5"], [20, "The last 20"], [50, "The last 50"]];
-const COLOURS = { plain: "Plain", segment: "By segment", quality: "By quality", range: "By range" };
+const COLOURS = { plain: "Plain", segment: "By wall", quality: "By quality", range: "By range" };
 
 export function mountView() {
   on(["fields"], (fields) => {

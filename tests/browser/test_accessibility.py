@@ -267,7 +267,7 @@ def test_page_has_landmarks_and_a_table_that_can_be_read_out(visitor: Visitor) -
     for name in ("Scene", "Timeline", "Corners", "Messages"):
         expect(page.get_by_role("region", name=name)).to_have_count(1)
     assert page.locator("#toasts").get_attribute("aria-live") == "polite"
-    assert "Corners of the current frame" in page.locator("#corner-table caption").text_content()
+    assert "Corners of the current scan" in page.locator("#corner-table caption").text_content()
     for part in ("thead th[scope]", "tbody th[scope=row]"):
         expect(page.locator(f"#corner-table {part}").first).to_be_visible()
     assert page.locator("#corner-table thead th:not([scope])").count() == 0

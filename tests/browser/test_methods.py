@@ -173,7 +173,9 @@ def test_layers_can_be_hidden(visitor: Visitor) -> None:
     visitor.fit()
     for layer in ("points", "segments", "ellipses", "grid"):
         before = drawn(visitor.still_picture()).sum()
-        page.locator("label.chip", has_text=layer.capitalize()).click()
+        page.locator(
+            "#view label.chip", has_text={"segments": "Walls"}.get(layer, layer.capitalize())
+        ).click()
         wait_until(
             lambda layer=layer: not visitor.knows("settings")["view"]["layers"][layer], f"{layer} are off"
         )
