@@ -89,12 +89,15 @@ let sheet = null; // as it was measured last
 
 const sheetNow = () => (sheet ??= measuredSheet());
 
-/** To be measured anew when something over the view comes, goes or changes its size: to measure takes time. */
+/** Measured anew, as that takes time, only when something over the view comes, goes or changes its size. */
 function watchSheet() {
-  const forget = () => (sheet = null);
-  const sizes = new ResizeObserver(forget);
+  const renew = () => {
+    sheet = null;
+    look();
+  };
+  const sizes = new ResizeObserver(renew);
   for (const id of ["stage", "legend"]) sizes.observe($(id));
-  new MutationObserver(forget).observe($("stage"), { childList: true });
+  new MutationObserver(renew).observe($("stage"), { childList: true });
 }
 
 /** The size of the view, and how much of its edges is taken, in pixels; on a narrow page that would leave too little. */

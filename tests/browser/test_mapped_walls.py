@@ -128,12 +128,15 @@ def test_all_walls_of_the_map_are_in_the_view_beside_the_legend(
     look: Callable[..., Visitor], mapped: Server
 ) -> None:
     visitor = look(1400, 900)
-    stage, legend = (visitor.page.locator(name).bounding_box() for name in ("#stage", "#legend"))
-    places = np.array(
-        [visitor.pixel_at(place) for wall in walls(mapped) for place in (wall["start"], wall["end"])]
-    )
-    assert (places > [legend["x"] + legend["width"], stage["y"]]).all()
-    assert (places < [stage["x"] + stage["width"], stage["y"] + stage["height"]]).all()
+
+    def are_all_in_the_free_part() -> bool:
+        stage, legend = (visitor.page.locator(name).bounding_box() for name in ("#stage", "#legend"))
+        ends = [place for wall in walls(mapped) for place in (wall["start"], wall["end"])]
+        places = np.array([visitor.pixel_at(place) for place in ends])
+        is_right = places > [legend["x"] + legend["width"], stage["y"]]
+        return bool((is_right & (places < [stage["x"] + stage["width"], stage["y"] + stage["height"]])).all())
+
+    wait_until(are_all_in_the_free_part, "the map lies in the free part of the view", 10)
 
 
 def test_a_click_tells_all_of_a_wall_and_what_it_was(look: Callable[..., Visitor], mapped: Server) -> None:
