@@ -76,10 +76,10 @@ class ViewSettings(_Frozen):
             ge=1,
             le=100,
             allow_inf_nan=False,
-            description="size of the ellipses in sigma. "
+            description="size of the corners' ellipses in sigma. "
             "More: larger ellipses on the screen; what they claim stays",
         ),
-    ] = 10.0
+    ] = 30.0
     theme: Annotated[
         Literal["dark", "light"],
         Field(description="colours of the scene, and of a browser that prefers none"),

@@ -1,7 +1,7 @@
 // The answer of a comparison: for each method, the area of its ellipses over that of the scatter, and how much of the
 // scatter its ellipses of 95 % hold. The method that is off by most is tinted, unless it may be true.
 
-import { setting } from "./actions.js";
+import { changeSetting, setting } from "./actions.js";
 import { $, el, setText } from "./dom.js";
 import { get } from "./store.js";
 import { fixed } from "./units.js";
@@ -9,39 +9,43 @@ import { fixed } from "./units.js";
 const QUESTIONS = [
   {
     key: "area_ratio",
-    label: "area / scatter",
+    label: "claimed / real area",
     title: "Area of the claimed ellipses over that of the scatter: 1 if they are true",
     text: (value) => fixed(value, 2),
     off: (value) => Math.abs(Math.log(value)),
   },
   {
     key: "coverage_95",
-    label: "in 95\u2009%",
+    label: "inside 95\u2009%",
     title: "How much of the scatter the 95 % ellipses hold: 95 % if they are true",
     text: (value) => `${fixed(100 * value, 0)}\u2009%`,
     off: (value) => Math.abs(value - 0.95),
   },
 ];
-const ASKING = "standing still, Repeatability on";
-
 const idOf = (key, method) => `answer-${key}-${method}`;
 
-/** Two rows of the table's head, a cell for each method over `each` columns. */
+/** Rows of the table's head, a cell for each method over `each` columns; until there is an answer, how to get it. */
 export function answerRows(methods, { before, each, after }) {
-  return QUESTIONS.map(({ key, label, title }) =>
+  const rows = QUESTIONS.map(({ key, label, title }) =>
     el(
       "tr",
-      { class: "answer", title },
+      { class: "answer", title, hidden: true },
       el("th", { scope: "row", colSpan: before }, label),
       ...methods.map((name) => el("td", { id: idOf(key, name), colSpan: each }, "")),
       el("td", { colSpan: after }),
     ),
   );
+  const ask = el("button", { type: "button", onclick: () => changeSetting("repeatability.running", true) }, "Compare with the next scans");
+  const words = el("td", { colSpan: before + methods.length * each + after }, "Which ellipses are true? Keep the sensor still. ", ask);
+  return [...rows, el("tr", { class: "asking", hidden: true }, words)];
 }
 
 /** Writes what repeatability says, of the covariance that is shown. */
 export function drawAnswer({ methods }, { methods: judged }) {
   if (methods.length < 2) return;
+  const isAsked = get("settings").repeatability.running || judged.some(({ corners }) => corners.length);
+  for (const row of $("corner-table").tHead.querySelectorAll(".answer")) row.hidden = !isAsked;
+  for (const row of $("corner-table").tHead.querySelectorAll(".asking")) row.hidden = isAsked;
   const kind = setting("extraction.covariance");
   const claims = new Map(judged.map(({ name, claims }) => [name, claims[kind]]));
   for (const { key, text, off } of QUESTIONS) {
@@ -52,7 +56,6 @@ export function drawAnswer({ methods }, { methods: judged }) {
       const cell = $(idOf(key, name));
       if (!cell) return; // the head is made with the next frame
       setText(cell, values[i] === null ? "\u2013" : text(values[i]));
-      cell.title = values[i] === null && !get("settings").repeatability.running ? ASKING : "";
       cell.classList.toggle("worst", worst > 0 && wrong[i] === worst);
     });
   }

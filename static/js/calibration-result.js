@@ -111,7 +111,7 @@ function actions(told, set) {
   const inUse = sameNoise(found, set);
   const use = el(
     "button",
-    { type: "button", class: "button", "data-key": "use", disabled: inUse, onclick: () => useNoise(found) },
+    { type: "button", class: inUse ? "button" : "button strong", "data-key": "use", disabled: inUse, onclick: () => useNoise(found) },
     inUse ? "In use" : "Use",
   );
   const name = el("input", {

@@ -2,12 +2,12 @@
 
 import { KINDS } from "./boxes.js";
 import { startCalibration } from "./calibration.js";
-import { $, el, setText, swatch } from "./dom.js";
+import { $, el, remake, setText, swatch } from "./dom.js";
 import { showPanel } from "./tabs.js";
-import { fixed, UNKNOWN } from "./units.js";
+import { capital, fixed, UNKNOWN } from "./units.js";
 
 const FIGURES = [
-  { key: "area_ratio", label: "claimed / scatter", factor: 1, digits: 2 },
+  { key: "area_ratio", label: "claimed / real", factor: 1, digits: 2 },
   { key: "coverage_50", label: "in 50\u2009%", factor: 100, digits: 0 },
   { key: "coverage_95", label: "in 95\u2009%", factor: 100, digits: 1 },
   { key: "coverage_99", label: "in 99\u2009%", factor: 100, digits: 1 },
@@ -55,7 +55,9 @@ export function drawTable(methods, { fitter, covariance }, id, verdict) {
   for (const body of [...table.tBodies]) body.remove();
   table.append(...methods.map(bodyOf));
   const used = methods.find(({ name }) => name === fitter)?.claims[covariance];
-  setText($(verdict), used ? sentence(fitter, covariance, used) : "");
+  const said = used ? sentence(fitter, covariance, used) : "";
+  const others = used ? othersOff(methods, fitter, covariance) : [];
+  remake($(verdict), [said, others], () => [said, ...others.map(([size, text]) => el("span", { class: "verdict", "data-verdict": size }, text))]);
   $(verdict).dataset.verdict = used?.verdict ?? "";
 }
 
@@ -106,6 +108,16 @@ function sentence(fitter, covariance, { judgement, verdict }) {
   );
 }
 
+/** Which of the other methods' ellipses are of a wrong size, and how much of the scatter they hold. */
+function othersOff(methods, fitter, covariance) {
+  const off = (size) =>
+    methods
+      .filter(({ name, claims }) => name !== fitter && claims[covariance].verdict === size)
+      .map(({ name, claims }) => `${name} ${fixed(100 * claims[covariance].judgement.coverage_95.value, 0)}\u2009%`);
+  const sizes = Object.keys(NOISE).filter((size) => off(size).length);
+  return sizes.map((size) => [size, ` ${capital(size)}: ${off(size).join(", ")}.`]);
+}
+
 /** How even the exact covariances are wrong for all methods, if they are: it is the noise they are told. */
 function wrongForAll(methods) {
   const [verdict, ...others] = new Set(methods.map(({ claims }) => claims.consistent.verdict));
@@ -115,7 +127,7 @@ function wrongForAll(methods) {
 function drawHint(verdict) {
   const hint = $("repeatability-hint");
   hint.hidden = !verdict;
-  $("repeatability-claims").classList.toggle("doubted", Boolean(verdict));
+  $("repeatability").classList.toggle("doubted", Boolean(verdict));
   if (!verdict) return;
   setText(
     hint.firstElementChild,

@@ -9,20 +9,22 @@ import { COMPLETE_HINT, fixed, microseconds, milliseconds, percent, UNKNOWN } fr
 
 const CONNECTION = { connecting: "Connecting", open: "Connected", lost: "Connection lost" };
 
-/** Figures of the frame shown, or (`now`) of what comes at present, which is not known when nothing comes. */
+/** Figures of the frame shown, or (`now`) of what comes at present, which is not known when nothing comes; first those that a narrow page has room for. */
 const READOUTS = [
-  {
-    key: "frame",
-    label: "Scans",
-    hint: "Scans processed since the server started. While the number stands still, no scan arrives",
-    text: ({ frame }) => frame.sequence,
-  },
   {
     key: "rate",
     label: "Rate",
     hint: "Scans a second",
     now: true,
     text: (now) => `${fixed(rateOf(now), 1)}\u2009Hz`,
+  },
+  { key: "corners", label: "Corners", text: ({ frame }) => frame.corners.length },
+  { key: "segments", label: "Walls", text: ({ frame }) => frame.segments[frame.fitter]?.length ?? 0 },
+  {
+    key: "extract",
+    label: "Extraction",
+    hint: "Time to find walls and corners in this scan",
+    text: ({ frame }) => microseconds(frame.timings.extract_us),
   },
   {
     key: "latency",
@@ -32,10 +34,16 @@ const READOUTS = [
     text: () => milliseconds(quantile(({ age }) => age, 0.5)),
   },
   {
-    key: "extract",
-    label: "Extraction",
-    hint: "Time to find segments and corners in this scan",
-    text: ({ frame }) => microseconds(frame.timings.extract_us),
+    key: "frame",
+    label: "Scans",
+    hint: "Scans processed since the server started. While the number stands still, no scan arrives",
+    text: ({ frame }) => frame.sequence,
+  },
+  {
+    key: "beams",
+    label: "Beams",
+    hint: "Beams with a return, of all beams in this scan",
+    text: ({ frame }) => `${frame.n_valid}\u2009/\u2009${frame.n_beams}`,
   },
   {
     key: "complete",
@@ -44,14 +52,6 @@ const READOUTS = [
     now: true,
     text: ({ frame }) => percent(frame.completeness),
   },
-  {
-    key: "beams",
-    label: "Beams",
-    hint: "Beams with a return, of all beams in this scan",
-    text: ({ frame }) => `${frame.n_valid}\u2009/\u2009${frame.n_beams}`,
-  },
-  { key: "segments", label: "Segments", text: ({ frame }) => frame.segments[frame.fitter]?.length ?? 0 },
-  { key: "corners", label: "Corners", text: ({ frame }) => frame.corners.length },
   {
     key: "dropped",
     label: "Dropped",
@@ -63,8 +63,8 @@ const READOUTS = [
 export function mountHeader() {
   $("readouts").append(
     sourceReadout(),
-    ...READOUTS.map(readout),
     noiseRemark(),
+    ...READOUTS.map(readout),
   );
   on(["frame"], ({ noise_remark: remark }) => {
     $("noise-remark").parentElement.hidden = !remark;

@@ -29,7 +29,7 @@ export function inspectedCorner(frame) {
       covariance: measured[method].covariance,
       offset: [measured[method].x - x, measured[method].y - y],
     })),
-    axes: "mm",
+    axes: "x to the right, y up, mm",
   };
 }
 

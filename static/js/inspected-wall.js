@@ -40,7 +40,7 @@ export function inspectedWall(frame) {
       covariance,
       offset: [turn(alpha - wall.alpha), r - wall.r],
     })),
-    axes: "direction α to the right in mrad, distance r upwards in mm",
+    axes: "α to the right, mrad, r up, mm",
   };
 }
 

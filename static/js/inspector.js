@@ -2,9 +2,9 @@
 // of the map, what it was before.
 
 import { changeSetting, select } from "./actions.js";
-import { KINDS } from "./boxes.js";
 import { $, el, iconButton, remake, setText, swatch } from "./dom.js";
 import { makeFigure } from "./figure.js";
+import { fillHeld, heldTable } from "./held.js";
 import { inspectedCorner } from "./inspected-corner.js";
 import { inspectedMapped, mountInspectedMapped } from "./inspected-mapped.js";
 import { inspectedWall, mountInspectedWall } from "./inspected-wall.js";
@@ -12,7 +12,6 @@ import { lookNow } from "./scene.js";
 import { claimsOf, plotScatter, scatterDrawing } from "./scatter.js";
 import { get, on } from "./store.js";
 
-const EXPECTED = 0.95;
 const SHOWN = ["frame", "selection", "wall", "mapped", "mappedWall", "wallHistory", "length", "repeatability", "deviations", "wallDeviations", "settings"];
 
 let shown; // what the card is about
@@ -23,7 +22,7 @@ const facts = el("dl", { class: "facts" });
 const rows = el("table", { class: "listing" });
 const ways = el("p", { class: "ways" });
 const caption = el("p", { class: "muted" });
-const counts = el("ul", { class: "held" });
+const counts = heldTable();
 const history = el("div");
 const start = el("button", { type: "button", title: "Keep the sensor still meanwhile" }, "Compare with the next scans");
 const sightings = el("div", {}, drawing, caption, counts, start);
@@ -75,8 +74,8 @@ function draw(thing) {
 /** `sighted` is what the last scans say of the thing, if they are compared; `claims` what this scan says. */
 function drawSightings({ name, methods, sighted, deviations, claims, axes }) {
   const dots = (sighted && deviations?.id === sighted.id && deviations.deviations[methods[0]]) || [];
-  showHeld(sighted ? heldBy(sighted, methods) : []);
-  setText(caption, sighted ? `95\u2009% ellipses and ${dots.length} sightings by ${methods[0]} from their mean, ${axes}` : `95\u2009% ellipses of this scan, ${axes}`);
+  fillHeld(counts, sighted?.methods ?? {}, methods);
+  setText(caption, sighted ? `95\u2009% ellipses and the last ${dots.length} sightings by ${methods[0]}, from their mean: ${axes}` : `95\u2009% ellipses of this scan: ${axes}`);
   start.hidden = get("settings").repeatability.running;
   plotScatter(drawing, sighted ? claimsOf(chosen(sighted.methods, methods)) : claims, dots);
   drawing.setAttribute("aria-label", `${name}: ellipses of ${methods.join(", ")}, and where it was seen`);
@@ -117,24 +116,4 @@ function showHistory({ key, history: states, figure }) {
   });
 }
 
-function showHeld(held) {
-  remake(counts, held, () => held.map(entry));
-}
-
 const chosen = (all, names) => Object.fromEntries(names.filter((name) => all[name]).map((name) => [name, all[name]]));
-
-/** How many of the sightings each method's 95 % ellipses hold: {method, kind, inside, count}. */
-function heldBy({ methods: all }, names) {
-  return Object.entries(chosen(all, names)).flatMap(([method, { count, claims }]) =>
-    KINDS.map((kind) => {
-      const share = claims[kind].judgement.coverage_95.value;
-      return { method, kind, count, inside: share === null ? null : Math.round(share * count) };
-    }),
-  );
-}
-
-function entry({ method, kind, inside, count }) {
-  const title = get("methods").find(({ name }) => name === method).title;
-  const words = inside === null ? "too few sightings yet" : `${inside} of ${count} inside, ${Math.round(EXPECTED * count)} expected`;
-  return el("li", { "data-method": method, "data-kind": kind }, swatch(method), `${title} ${kind}: ${words}`);
-}

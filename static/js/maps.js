@@ -110,8 +110,7 @@ function row({ id, source, mode, started, landmarks, walls, grid }, live) {
   return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
 }
 
-const nothingToSave = () =>
-  el("p", { class: "muted" }, "Nothing to save or clear: no map is built or localized in.");
+const nothingToSave = () => el("p", { class: "muted" }, "There is no map to save or clear.");
 
 const buildingLinks = () => [
   el("p", { class: "muted" }, "Save the map of the building as"),

@@ -7,9 +7,8 @@ import { get, on } from "./store.js";
 import { capital } from "./units.js";
 
 const COVARIANCES = {
-  consistent: "Exact to first order under the noise model: the fitter's own sensitivity to every point.",
-  published:
-    "The formula printed in the method's paper. For CWLF and WCTLS its ellipses are too small.",
+  consistent: "From how the noise of every beam moves the fit: the ellipses are true as long as the noise below is.",
+  published: "As printed in the method's paper. For CWLF and WCTLS its ellipses are too small.",
 };
 
 export function mountMethod() {

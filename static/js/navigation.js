@@ -24,7 +24,7 @@ const MOTION_HINT =
   "What predicts the pose between scans. Auto: odometry when the source has it, else the velocity estimated so far";
 
 const ABOUT = {
-  off: "The pose is not estimated. The scene shows the scan in the sensor frame.",
+  off: "The view is drawn from the sensor. SLAM builds a map while the sensor moves; Localize finds the sensor in a map that there is.",
   slam: "Builds a map and finds the sensor in it at the same time.",
   localize: "Finds the sensor in an existing map.",
 };
@@ -92,10 +92,10 @@ export function mountNavigation() {
   on(["settings", "localization"], ({ navigation }, localization) => {
     const { mode, landmarks } = navigation;
     const wholeScans = isOfScans(navigation, localization);
-    $("map").dataset.of = !wholeScans ? "landmarks" : mode === "slam" ? "scans" : "grid";
+    $("map").dataset.of = mode === "off" ? "nothing" : !wholeScans ? "landmarks" : mode === "slam" ? "scans" : "grid";
     methodRow.hidden = mode === "localize";
     landmarksRow.hidden = mode !== "localize" || wholeScans;
-    motionRow.hidden = wholeScans;
+    motionRow.hidden = wholeScans || mode === "off";
     $("cluster-hint").hidden = wholeScans || landmarks !== "clusters";
     setText($("mode-about"), ABOUT[mode]);
     reset.disabled = mode === "off";

@@ -15,6 +15,8 @@ const STATES = {
   lost: "Lost, looking for a known place",
 };
 
+const MANY = 10; // scans skipped, by which a map suffers
+
 /** A figure with its standard deviation. */
 const POSE = [
   {
@@ -123,7 +125,20 @@ const countList = () =>
     ),
   );
 
-function draw({ localization: now, timings }, { navigation }, source, connection, { problem }) {
+let played = null; // the part of a recording that was played last: {index of its newest scan, dropped when it began}
+
+/** What is said where a recording plays faster than a map can be made of it. */
+function skippedText({ localization: now, dropped, source }) {
+  if (!now || source.kind !== "recording") played = null;
+  else if (!played || source.index < played.index) played = { index: source.index, dropped };
+  else played.index = source.index;
+  const skipped = played ? dropped - played.dropped : 0;
+  if (skipped < MANY) return "";
+  return `${wholeNumber(skipped)} scans were skipped: at this speed the map cannot keep up. Press Reset and play from the beginning at the speed max, which waits for every scan.`;
+}
+
+function draw(frame, { navigation }, source, connection, { problem }) {
+  const { localization: now, timings } = frame;
   $("pose-panel").hidden = navigation.mode === "off";
   if (navigation.mode === "off") return;
   const stale = isStale(source, connection);
@@ -133,7 +148,7 @@ function draw({ localization: now, timings }, { navigation }, source, connection
     $("pose-panel-state"),
     stale ? "Unknown, no scans arrive. Last known pose:" : stateText(now, problem),
   );
-  const message = now?.message ?? "";
+  const message = [now?.message, skippedText(frame)].filter(Boolean).join(" ");
   $("pose-panel-message").hidden = !message;
   setText($("pose-panel-message"), message);
   for (const { key, value, sigma } of POSE) {

@@ -4,10 +4,11 @@ import { $, el, setText } from "./dom.js";
 import { throttled } from "./throttle.js";
 import { placer } from "./overlay/world.js";
 import { get, on, set } from "./store.js";
-import { fixed } from "./units.js";
+import { capital, fixed } from "./units.js";
 
 const REFRESH_MS = 1000; // slower than the frames: these are sentences to read
 const MOST = 60;
+const KINDS = { segment: "Wall" };
 
 export function mountRejections() {
   on(["frame"], ({ rejections }) => setText($("rejection-count"), rejections.length));
@@ -17,11 +18,11 @@ export function mountRejections() {
 }
 
 function draw({ rejections }) {
-  const groups = Map.groupBy(rejections.slice(0, MOST), ({ kind, reason }) => `${kind}: ${reason}`);
+  const groups = Map.groupBy(rejections.slice(0, MOST), ({ kind, reason }) => `${KINDS[kind] ?? capital(kind)}: ${reason}`);
   const sections = [...groups].map(([title, items]) => group(title, items));
   const beyond = rejections.length - MOST;
   if (beyond > 0) sections.push(el("p", { class: "muted" }, `And ${beyond} more.`));
-  if (!rejections.length) sections.push(el("p", { class: "empty" }, "Nothing was rejected in this frame."));
+  if (!rejections.length) sections.push(el("p", { class: "empty" }, "Nothing was rejected in this scan."));
   $("rejection-list").replaceChildren(...sections);
 }
 
@@ -29,7 +30,7 @@ function group(title, items) {
   const heading = el(
     "h3",
     {},
-    title.charAt(0).toUpperCase() + title.slice(1),
+    title,
     el("span", { class: "count" }, ` ${items.length}`),
   );
   return el("section", {}, heading, el("ul", { class: "reasons" }, ...items.map(entry)));

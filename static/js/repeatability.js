@@ -55,6 +55,8 @@ function make(fields) {
       parameterRow({ ...window, unit: "scans" }),
       progress(),
       el("p", { id: "repeatability-message", class: "notice", hidden: true }),
+      calibrateHint(),
+      el("p", { id: "repeatability-verdict" }),
       el("div", { class: "buttons" }, startOver(), download()),
     ),
     el(
@@ -69,8 +71,6 @@ function make(fields) {
       "section",
       { id: "repeatability-claims", "aria-labelledby": "claims-title", hidden: true },
       title("claims-title", "Corners: claim and scatter"),
-      calibrateHint(),
-      el("p", { id: "repeatability-verdict" }),
       el("div", { class: "table-scroll", tabIndex: -1 }, claimTable()),
       el("p", { class: "muted" }, "First the sum of the areas, where large ellipses of far corners weigh most; then how much of the scatter, in %, the ellipses of 50, 95 and 99 % hold. Below each its 95 % confidence interval."),
     ),

@@ -2,7 +2,7 @@
 
 import { KINDS } from "./boxes.js";
 import { $, el, remake, setText } from "./dom.js";
-import { axesOf } from "./overlay/ellipses.js";
+import { axesOf, SIGMAS } from "./overlay/ellipses.js";
 import { select } from "./actions.js";
 import { get } from "./store.js";
 import { drawing, roundStep, shape } from "./svg.js";
@@ -12,7 +12,6 @@ const SIZE = 360;
 const CENTRE = SIZE / 2;
 const LEFT = 24; // of the scale's figures
 const HALF = 154; // px from the centre to the end of the scale
-const SIGMAS = Math.sqrt(-2 * Math.log(1 - 0.95)); // of an ellipse that holds 95 %
 const MOST = 0.98; // of the dots that the scale is made for
 const MARGIN = 1.1;
 const SAME_M = 0.3; // between a corner of the frame and one of the window

@@ -4,7 +4,7 @@
 import { $ } from "./dom.js";
 import { setting, toggleSetting } from "./actions.js";
 import { Fading } from "./overlay/fading.js";
-import { framingOf, isFramed } from "./overlay/framing.js";
+import { framingOf, including, isFramed } from "./overlay/framing.js";
 import { Look, PlainCamera } from "./overlay/look.js";
 import { letGo } from "./overlay/tools.js";
 import { get, on } from "./store.js";
@@ -47,7 +47,7 @@ export function mountScene(press) {
     requestAnimationFrame(() => setTimeout(() => ($("scene").src = "viser/")));
     stop();
   });
-  on(["frame", "tools"], look);
+  for (const key of ["frame", "tools", "mapped", "landmarks"]) on([key], look);
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
     if (ours) handlers.get(data?.type)?.(data);
@@ -72,20 +72,32 @@ function look() {
 
 function framed(frame) {
   if (!frame) return undefined;
-  const framing = framingOf(frame.extent, frame.localization?.pose, get("tools"), sheetNow());
-  return { ...framing, isFramed: isFramed(frame.extent, lookNow(), sheetNow()) };
+  const extent = extentOf(frame);
+  const framing = framingOf(extent, frame.localization?.pose, get("tools"), sheetNow());
+  return { ...framing, isFramed: isFramed(extent, lookNow(), get("tools"), sheetNow()) };
+}
+
+/** What is to be seen: what the scan sees, and all of the map, unless the view goes along with the sensor. */
+function extentOf({ extent, localization }) {
+  if (!localization || get("tools").follow) return extent;
+  const walls = get("mapped").walls.flatMap(({ ends }) => ends);
+  const landmarks = [...(get("landmarks")?.values() ?? [])].map(({ x, y }) => [x, y]);
+  return including(extent, [...walls, ...landmarks]);
 }
 
 let sheet = null; // as it was measured last
 
 const sheetNow = () => (sheet ??= measuredSheet());
 
-/** To be measured anew when something over the view comes, goes or changes its size: to measure takes time. */
+/** Measured anew, as that takes time, only when something over the view comes, goes or changes its size. */
 function watchSheet() {
-  const forget = () => (sheet = null);
-  const sizes = new ResizeObserver(forget);
+  const renew = () => {
+    sheet = null;
+    look();
+  };
+  const sizes = new ResizeObserver(renew);
   for (const id of ["stage", "legend"]) sizes.observe($(id));
-  new MutationObserver(forget).observe($("stage"), { childList: true });
+  new MutationObserver(renew).observe($("stage"), { childList: true });
 }
 
 /** The size of the view, and how much of its edges is taken, in pixels; on a narrow page that would leave too little. */

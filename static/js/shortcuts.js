@@ -57,7 +57,7 @@ const SHORTCUTS = [
   { keys: ["v"], about: "Consistent or published covariance", run: swapCovariance },
   {
     keys: Object.keys(LAYERS),
-    about: "Points, segments, corners, ellipses, clusters, rejected, grid",
+    about: "Points, walls, corners, ellipses, clusters, rejected, grid",
     run: (key) => toggleSetting(`view.layers.${LAYERS[key]}`),
   },
   { keys: ["-", "+"], about: "Smaller, larger ellipses", run: scaleEllipses },

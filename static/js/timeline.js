@@ -85,7 +85,7 @@ function drawPosition(source, frame) {
   const current = frame.source.kind === source.kind ? frame.source : source;
   const index = transport.pending().index ?? current.index;
   setText(time, clock(current.time));
-  if (source.live) return setText(position, `scan ${wholeNumber(index + 1)}`);
+  if (source.live) return setText(position, isPlaying(source) ? "" : `scan ${wholeNumber(index + 1)}`);
   seek.max = String(Math.max(0, (source.count ?? 1) - 1));
   seek.setAttribute("aria-valuetext", `scan ${index + 1} of ${source.count}, ${clock(current.time)}`);
   if (!seek.matches(":active")) seek.value = String(index);

@@ -42,7 +42,7 @@ export function microseconds(value) {
 }
 
 /** A duration given in microseconds, in milliseconds. */
-export const milliseconds = (value) => `${fixed(value / 1e3, 1)}\u2009ms`;
+export const milliseconds = (value) => (Number.isFinite(value) ? `${fixed(value / 1e3, 1)}\u2009ms` : UNKNOWN);
 
 /** A share of one; what is not whole is never shown as 100 %. */
 export function percent(share) {

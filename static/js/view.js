@@ -5,6 +5,7 @@ import { settings } from "./actions.js";
 import { $, el, remake } from "./dom.js";
 import { stroke } from "./figure.js";
 import { parameterRow } from "./parameters.js";
+import { LANDMARK_SIGMAS } from "./overlay/marks.js";
 import { TOOLS } from "./overlay/tools.js";
 import { ownChoices } from "./own.js";
 import { isOfScans } from "./pose.js";
@@ -12,12 +13,19 @@ import { get, on } from "./store.js";
 import { shape } from "./svg.js";
 import { fixed } from "./units.js";
 
-const OF_MAP = ["pose", "trail", "dead_reckoned", "truth", "occupancy", "walls", "landmarks", "associations"];
+/** Layers of the map, with what a map has to be of to have them. */
+const OF_MAP = { pose: "", trail: "", dead_reckoned: "", truth: "", occupancy: "grid", walls: "scans", landmarks: "landmarks", associations: "landmarks" };
+
+/** What layers are called here and in the legend, where their key would not say it. */
+const NAMES = {
+  segments: "Walls", pose: "Position", trail: "Estimated path", dead_reckoned: "Odometry path", truth: "True path",
+  walls: "Walls of the map", associations: "Matches",
+};
 
 const narrow = matchMedia("(max-width: 1199px)"); // where the room needs the place
 
 const FADES = [[0, "None"], [5, "The last 5"], [20, "The last 20"], [50, "The last 50"]];
-const COLOURS = { plain: "Plain", segment: "By segment", quality: "By quality", range: "By range" };
+const COLOURS = { plain: "Plain", segment: "By wall", quality: "By quality", range: "By range" };
 
 export function mountView() {
   on(["fields"], (fields) => {
@@ -52,10 +60,12 @@ function resetRow() {
 
 /** Toggles for the layers of the scene: those of a scan, or those of the map. */
 export function layerChips(fields, { ofMap }) {
-  const layers = fields.filter(
-    ({ path, key }) => path.startsWith("view.layers.") && OF_MAP.includes(key) === ofMap,
-  );
-  const chips = layers.map(({ path, label, description }) => chip(label, path, description));
+  const layers = fields.filter(({ path, key }) => path.startsWith("view.layers.") && key in OF_MAP === ofMap);
+  const chips = layers.map(({ path, key, label, description }) => {
+    const node = chip(NAMES[key] ?? label, path, description);
+    node.dataset.of = OF_MAP[key] ?? "";
+    return node;
+  });
   const group = el("fieldset", { class: "chips" });
   group.append(el("legend", { class: "visually-hidden" }, "Layers"), ...chips);
   return group;
@@ -69,27 +79,28 @@ const OF_SCAN = [
   { layer: "sensor", sign: "mask-sign", label: "Masked", isKnown: (_, { sensor }) => sensor.mask?.length },
   { layer: "rejected", sign: "rejected-sign", label: "Rejected" },
   { layer: "clusters", sign: "cluster-sign", label: "Cluster, 2σ" },
-  { layer: "gaps", sign: "gap-sign", label: "Lost sector", isKnown: ({ gaps }) => gaps.length },
+  { layer: "gaps", sign: "gap-sign", label: "Gap, data lost", isKnown: ({ gaps }) => gaps.length },
 ];
 
-/** The ways of the sensor that the scene may show: layer -> sign, and whether it is known. */
+/** Where the sensor is and was, as the scene may show it: layer -> sign, and whether it is known. */
 const PATHS = [
-  { layer: "trail", sign: "trail", label: "Estimated path", isKnown: () => true },
+  { layer: "pose", sign: "pose-sign", label: "Position, 95\u2009%", isKnown: () => true },
+  { layer: "trail", sign: "trail", label: NAMES.trail, isKnown: () => true },
   {
     layer: "dead_reckoned",
     sign: "reckoned",
-    label: "Odometry path",
+    label: NAMES.dead_reckoned,
     isKnown: ({ dead_reckoned: way }) => way,
   },
-  { layer: "truth", sign: "true", label: "True path", isKnown: ({ truth }) => truth },
+  { layer: "truth", sign: "true", label: NAMES.truth, isKnown: ({ truth }) => truth },
 ];
 
 /** What is drawn of the map: layer -> signs. */
 const MAPPED = [
   { layer: "walls", sign: "mapped-wall", label: "Wall of the map" },
-  { layer: "landmarks", sign: "landmark", label: "Landmark" },
+  { layer: "landmarks", sign: "landmark", label: `Landmark, ${LANDMARK_SIGMAS}\u2009σ` },
   { layer: "landmarks", sign: "tentative", label: "Tentative" },
-  { layer: "associations", sign: "association", label: "Match" },
+  { layer: "associations", sign: "association", label: NAMES.associations },
 ];
 
 const SIZES = { grown: "too small to see: drawn larger", shrunk: "larger than the view: drawn smaller" };
@@ -109,7 +120,7 @@ function drawLegend(frame, settings, methods, sizes, localization) {
   remake($("legend-body"), shown, () => {
     const titles = new Map(methods.map(({ name, title, dash }) => [name, { title, dash }]));
     const entries = [
-      ...frame.methods.map((name) => methodEntry(name, titles.get(name))),
+      ...frame.methods.map((name) => methodEntry(name, titles.get(name), frame.methods.length > 1)),
       ...signs.map(({ sign, label }) => el("li", {}, stroke(sign), label)),
     ];
     return [
@@ -120,15 +131,15 @@ function drawLegend(frame, settings, methods, sizes, localization) {
   });
 }
 
-/** A method with a piece of its outline: colour and dash. */
-function methodEntry(name, { title, dash }) {
+/** A method with a piece of its outline: colour and dash; a single one has made all walls, and need not be named. */
+function methodEntry(name, { title, dash }, isCompared) {
   const outline = shape("path", { method: name, d: "M0 5H22", "stroke-dasharray": dash.join(" ") });
   const sign = shape("svg", { class: "outline-sign", viewBox: "0 0 22 10", "aria-hidden": "true" }, outline);
-  return el("li", { class: "method-name" }, sign, title);
+  return el("li", { class: "method-name" }, sign, isCompared ? title : "Wall");
 }
 
 function ellipseNotes({ methods, covariance }, scale, sizes) {
-  const enlarged = `Ellipses 1σ × ${fixed(scale, Number.isInteger(scale) ? 0 : 1)}, ${covariance}`;
+  const enlarged = `Ellipses of corners: ${fixed(scale, Number.isInteger(scale) ? 0 : 1)}\u2009σ, ${covariance}`;
   const apart = methods.length > 1 ? ["Outlines that would coincide lie 3 px apart"] : [];
   const resized = Object.entries(SIZES)
     .filter(([size]) => sizes?.[size])

@@ -21,7 +21,7 @@ const WHENCE = {
 
 const STEPS = [
   ["Compare methods", "Which method's ellipse is true? Shows all methods on one corner, with the ellipses their papers publish", compare],
-  ["Calibrate my sensor", "Measures the noise of this sensor, so that its ellipses are true. It has to stand still meanwhile", calibrate],
+  ["Calibrate my sensor", "Measures the noise of this sensor, so that its ellipses are true. Keep it still meanwhile", calibrate],
   ["Build a map", "A simulated robot drives through an office where people walk, and the map grows", buildMap],
 ];
 

@@ -93,6 +93,27 @@ def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     expect(phone.page.frame_locator("#scene").get_by_text("Connected")).to_be_hidden()
 
 
+def test_a_phone_on_its_side_has_the_panel_beside_the_view(visit: Callable[..., Visitor]) -> None:
+    page = visit(844, 390, has_touch=True, is_mobile=True).open().page
+    page.get_by_role("tab", name="Setup").tap()
+    view, panel = (page.locator(name).bounding_box() for name in ("#stage", "#setup"))
+    assert view["x"] + view["width"] <= panel["x"]
+    assert min(view["height"], panel["height"]) > 390 / 2
+    assert panel["y"] + panel["height"] <= 390
+
+
+def test_what_is_selected_elsewhere_leaves_the_tabs_of_a_phone_free(phone: Visitor) -> None:
+    corner = phone.server.pause()["corners"][0]["id"]
+    phone.server.api.put("selection", json={"corner": corner}).raise_for_status()
+    card = phone.page.get_by_role("complementary", name="Inspector")
+    expect(card).to_be_visible()
+    tabs = phone.page.get_by_role("tablist").bounding_box()
+    assert card.bounding_box()["y"] >= tabs["y"] + tabs["height"]
+    phone.page.get_by_role("tab", name="Setup").tap()
+    card.get_by_role("button", name="Fold the inspector").tap()
+    expect(phone.page.get_by_label("Fitter")).to_be_in_viewport()
+
+
 @pytest.mark.long
 def test_narrow_page_plays_and_selects(phone: Visitor) -> None:
     phone.page.get_by_role("button", name="Pause").tap()
@@ -246,7 +267,7 @@ def test_page_has_landmarks_and_a_table_that_can_be_read_out(visitor: Visitor) -
     for name in ("Scene", "Timeline", "Corners", "Messages"):
         expect(page.get_by_role("region", name=name)).to_have_count(1)
     assert page.locator("#toasts").get_attribute("aria-live") == "polite"
-    assert "Corners of the current frame" in page.locator("#corner-table caption").text_content()
+    assert "Corners of the current scan" in page.locator("#corner-table caption").text_content()
     for part in ("thead th[scope]", "tbody th[scope=row]"):
         expect(page.locator(f"#corner-table {part}").first).to_be_visible()
     assert page.locator("#corner-table thead th:not([scope])").count() == 0

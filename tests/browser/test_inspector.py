@@ -67,7 +67,7 @@ def test_wall_clicked_tells_what_each_method_says_of_it(compared: Visitor) -> No
     frame = compared.server.get("frame")
     wall, ends = whole_wall(frame)
     card = click(compared, wall)
-    rows = card.locator("tbody tr")
+    rows = card.get_by_role("table").first.locator("tbody tr")
     expect(rows).to_have_count(len(frame["methods"]))
     for method, row in zip(frame["methods"], rows.all(), strict=True):
         expect(row.get_by_role("rowheader")).to_have_text(method)
@@ -101,8 +101,11 @@ def test_wall_shows_its_repeatability(compared: Visitor) -> None:
     expect(card.locator("circle.dot")).to_have_count(len(dots))
     for kind, claim in sighted["claims"].items():
         inside = round(claim["judgement"]["coverage_95"]["value"] * sighted["count"])
-        item = card.locator(f"li[data-method={frame['fitter']}][data-kind={kind}]")
-        expect(item).to_contain_text(f"{inside} of {sighted['count']} inside")
+        cell = card.locator(f"td[data-method={frame['fitter']}][data-kind={kind}]")
+        expect(cell).to_have_text(f"{inside} of {sighted['count']}")
+        expect(cell).to_have_attribute(
+            "title", re.compile(f"{kind}: {inside} of {sighted['count']} inside, ")
+        )
 
 
 @pytest.mark.long

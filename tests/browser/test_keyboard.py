@@ -14,7 +14,7 @@ def view(server: Server) -> dict:
 
 OWN = {
     "g": lambda view: not view["layers"]["grid"],
-    "+": lambda view: view["ellipse_scale"] > 10,
+    "+": lambda view: view["ellipse_scale"] > 30,
     "r": lambda view: view["rotate"],
 }
 

@@ -99,7 +99,9 @@ def number(text: str) -> float:
 def test_slam_is_switched_on_and_landmarks_appear(map_page: Visitor) -> None:
     page, server = map_page.page, map_page.server
     page.get_by_role("tab", name="Map").click()
-    expect(page.locator("#pose-panel")).to_be_hidden()
+    layers = page.locator("#navigation").get_by_role("group", name="Layers")
+    for part in (page.locator("#pose-panel"), layers, page.get_by_role("button", name="Set pose")):
+        expect(part).to_be_hidden()
     page.locator("#navigation .segments label", has_text="Corners").first.click()
     page.locator("#navigation .segments label", has_text="SLAM").click()
     expect(page.locator("#pose-panel-state")).to_have_text("Tracking")
@@ -380,3 +382,21 @@ def test_simulation_is_set_up_and_started(mapped: Visitor) -> None:
     wait_until(lambda: server.get("frame")["source"]["kind"] == "simulation", "frames of it come")
     bearings = [np.arctan2(y, x) for x, y in server.get("frame?points=true")["points"]]
     assert max(np.abs(bearings)) == pytest.approx(np.pi / 2, abs=0.05)
+
+
+@pytest.mark.long
+def test_a_recording_that_plays_too_fast_for_a_map_says_so(mapped: Visitor) -> None:
+    server, page = mapped.server, mapped.page
+    server.patch("settings", {"navigation": {"mode": "slam", "method": "scans"}})
+    said = page.locator("#pose-panel-message")
+    recording = {"kind": "recording", "name": "real-rplidar-windsor.npz", "paused": True}
+    server.api.put("source", json=recording).raise_for_status()
+    server.patch("source", {"speed": 100, "loop": False, "state": "playing"})
+    wait_until(lambda: server.get("source")["state"] == "ended", "it has been played")
+    expect(said).to_contain_text("scans were skipped")
+    server.patch("source", {"index": 0, "state": "paused", "speed": 0})
+    page.get_by_role("button", name="Reset", exact=True).click()
+    expect(said).not_to_contain_text("skipped")
+    server.patch("source", {"state": "playing"})
+    wait_until(lambda: server.get("source")["state"] == "ended", "it has been played again")
+    expect(said).not_to_contain_text("skipped")

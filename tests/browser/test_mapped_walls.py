@@ -124,6 +124,21 @@ def test_pointing_at_a_wall_of_the_map_says_what_it_is(look: Callable[..., Visit
     assert f"seen in {wall['count']} keyframes since" in text
 
 
+def test_all_walls_of_the_map_are_in_the_view_beside_the_legend(
+    look: Callable[..., Visitor], mapped: Server
+) -> None:
+    visitor = look(1400, 900)
+
+    def are_all_in_the_free_part() -> bool:
+        stage, legend = (visitor.page.locator(name).bounding_box() for name in ("#stage", "#legend"))
+        ends = [place for wall in walls(mapped) for place in (wall["start"], wall["end"])]
+        places = np.array([visitor.pixel_at(place) for place in ends])
+        is_right = places > [legend["x"] + legend["width"], stage["y"]]
+        return bool((is_right & (places < [stage["x"] + stage["width"], stage["y"] + stage["height"]])).all())
+
+    wait_until(are_all_in_the_free_part, "the map lies in the free part of the view", 10)
+
+
 def test_a_click_tells_all_of_a_wall_and_what_it_was(look: Callable[..., Visitor], mapped: Server) -> None:
     visitor, wall = look(), seen_often(mapped)[0]
     visitor.page.mouse.click(*visitor.pixel_at(off_middle(wall)))

@@ -69,6 +69,19 @@ def test_comparison_fills_the_table_for_every_method(visitor: Visitor) -> None:
 
 
 @pytest.mark.long
+def test_comparison_without_an_answer_says_how_to_get_it(visitor: Visitor) -> None:
+    server, table = visitor.server, visitor.page.locator("#corner-table")
+    server.api.delete("repeatability").raise_for_status()
+    server.patch("settings", {"view": {"compare": True}})
+    expect(table).to_contain_text("Which ellipses are true?")
+    expect(table.get_by_text("inside 95")).to_be_hidden()
+    table.get_by_role("button", name="Compare with the next scans").click()
+    wait_until(lambda: server.get("settings")["repeatability"]["running"], "scans are compared")
+    expect(table.get_by_text("inside 95")).to_be_visible()
+    expect(table.get_by_text("Which ellipses are true?")).to_be_hidden()
+
+
+@pytest.mark.long
 def test_method_taken_out_of_the_comparison_leaves_the_frames(visitor: Visitor) -> None:
     server, page = visitor.server, visitor.page
     server.patch("settings", {"view": {"compare": True}})
@@ -160,7 +173,9 @@ def test_layers_can_be_hidden(visitor: Visitor) -> None:
     visitor.fit()
     for layer in ("points", "segments", "ellipses", "grid"):
         before = drawn(visitor.still_picture()).sum()
-        page.locator("label.chip", has_text=layer.capitalize()).click()
+        page.locator(
+            "#view label.chip", has_text={"segments": "Walls"}.get(layer, layer.capitalize())
+        ).click()
         wait_until(
             lambda layer=layer: not visitor.knows("settings")["view"]["layers"][layer], f"{layer} are off"
         )

@@ -1,8 +1,10 @@
 """The page lives: it loads from this machine alone, draws, and follows the frames."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from browsing import Visitor, drawn
+from browsing import GOLF, Visitor, drawn
 from playwright.sync_api import expect
 from waiting import wait_until
 
@@ -64,3 +66,18 @@ def test_plots_follow_the_frames(visitor: Visitor) -> None:
     shown = page.locator("#plots figure").nth(2).locator("output").first
     before = shown.inner_text()
     wait_until(lambda: shown.inner_text() != before, "the median area is updated")
+
+
+@pytest.mark.real_data
+def test_a_long_name_takes_the_place_of_figures_and_not_of_the_panel(visit: Callable[..., Visitor]) -> None:
+    visitor = visit(1400, 900).open()
+    name = "the_third_floor_of_the_old_building_in_the_afternoon.csv.gz"
+    (visitor.server.folder / name).write_bytes(GOLF.read_bytes())
+    visitor.server.api.put("source", json={"kind": "recording", "name": name}).raise_for_status()
+    expect(visitor.page.locator("#readout-source")).to_have_text(name)
+    panel, help_ = (visitor.page.locator(one).bounding_box() for one in ("#setup", "#help"))
+    assert panel["x"] + panel["width"] == 1400
+    assert help_["x"] + help_["width"] <= 1400
+    figures = visitor.page.locator("#readouts").bounding_box()
+    links = visitor.page.get_by_role("navigation", name="Page").bounding_box()
+    assert figures["x"] + figures["width"] <= links["x"]

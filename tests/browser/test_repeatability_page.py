@@ -124,6 +124,12 @@ def test_table_and_sentence_say_what_the_server_says(tab: Visitor) -> None:
                 rf"of ml hold {most}.% of the scatter, and those of 50.% hold {half}.%: .*{SIGNS[claim['verdict']]}"
             )
         )
+        for method in told["methods"]:
+            claim = method["claims"][kind]
+            if method["name"] != "ml" and claim["verdict"] in ("too small", "too large"):
+                held = text(claim["judgement"]["coverage_95"]["value"], 100, 0)
+                sort = claim["verdict"].capitalize()
+                expect(sentence).to_contain_text(re.compile(rf"{sort}: [^.]*{method['name']} {held}.%"))
 
 
 def set_noise(visitor: Visitor, sigma_range: float, sigma_bearing: float) -> None:
@@ -145,7 +151,7 @@ def test_where_all_are_wrong_the_way_to_calibration_stands_above_the_table(
     expect(hint).to_contain_text(
         f"of all methods are {verdict}: the sensor has {noise} noise than Setup says"
     )
-    expect(page.locator("#repeatability-hint ~ * #repeatability-table")).to_be_attached()
+    expect(page.locator("section:has(#repeatability-hint) ~ section #repeatability-table")).to_be_attached()
     words = page.locator("#repeatability-table td.verdict")
     muted = page.locator("#repeatability-areas p.muted").evaluate("node => getComputedStyle(node).color")
     expect(words.first).to_have_css("color", muted)

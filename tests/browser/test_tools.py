@@ -71,6 +71,20 @@ def test_the_sensor_stays_in_the_middle_until_the_view_is_dragged(robot: Visitor
 
 
 @pytest.mark.long
+def test_the_button_that_is_on_is_seen_below_the_pointer(robot: Visitor) -> None:
+    button = robot.page.get_by_role("button", name=HEADING)
+    colours = "node => ['color', 'backgroundColor'].map((name) => getComputedStyle(node)[name])"
+    button.click()
+    expect(button).to_have_attribute("aria-pressed", "true")
+    robot.page.mouse.move(0, 0)
+    robot.page.wait_for_timeout(500)  # colours change slowly
+    away = button.evaluate(colours)
+    button.hover()
+    robot.page.wait_for_timeout(500)
+    assert button.evaluate(colours) == away
+
+
+@pytest.mark.long
 def test_the_heading_points_up_however_the_sensor_turns(robot: Visitor) -> None:
     headings: list[float] = []
 

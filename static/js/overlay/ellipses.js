@@ -2,6 +2,7 @@
 
 export const LEAST_PX = 5; // mean half axis on the screen: below it, the mark of the corner would hide the ellipse
 export const APART_PX = 3; // between outlines around one corner that would fall on each other
+export const SIGMAS = Math.sqrt(-2 * Math.log(1 - 0.95)); // of an ellipse that holds 95 %
 const MOST = 0.45; // of the shorter side of the view
 const VERTICES = 48;
 
@@ -35,14 +36,16 @@ export function outlineOf([x, y], { long, short, direction }) {
 
 /**
  * How ellipses (m) around one corner are drawn in a view: in their order, each with the half axes (m) that are drawn,
- * and `size`: "true", "grown" if it had to be larger to be seen, "shrunk" if it would not fit.
+ * and `size`: "true", "grown" if it had to be larger to be seen, "shrunk" if it would not fit. Those that nearly coincide
+ * keep their order from scan to scan.
  */
 export function drawable(ellipses, look) {
   const metre = look.scale; // px
   const most = MOST * Math.min(look.width, look.height);
   const found = new Map();
   let least = LEAST_PX;
-  for (const ellipse of [...ellipses].sort((a, b) => mean(a) - mean(b))) {
+  const rank = (ellipse) => Math.round((metre * mean(ellipse)) / APART_PX);
+  for (const ellipse of [...ellipses].sort((a, b) => rank(a) - rank(b))) {
     const fitting = Math.min(1, most / (metre * ellipse.long));
     const missing = Math.max(0, least / metre - fitting * mean(ellipse));
     const [long, short] = [ellipse.long, ellipse.short].map((half) => fitting * half + missing);

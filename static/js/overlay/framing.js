@@ -26,15 +26,19 @@ export function framingOf(extent, { x, y, heading } = { x: 0, y: 0, heading: 0 }
   return { middle, half: height / (2 * scale), up, isTurned, isFollowed: follow };
 }
 
-/** Whether all of a room lies in the free part of a sheet, and fills it well. */
-export function isFramed(extent, look, { left, right, top, bottom, width, height }) {
+/** Whether all of a room lies in the free part of a sheet, unless the sensor is followed through it, and fills it well. */
+export function isFramed(extent, look, { follow }, { left, right, top, bottom, width, height }) {
   const corners = cornersOf(extent).map((corner) => look.toScreen(corner));
   if (!corners.every(Boolean)) return false;
   const free = [[left, width - right], [top, height - bottom]];
   const spans = [0, 1].map((axis) => corners.map((corner) => corner[axis])).map((all) => [Math.min(...all), Math.max(...all)]);
   const isInside = spans.every(([low, high], axis) => low >= free[axis][0] && high <= free[axis][1]);
-  return isInside && spans.some(([low, high], axis) => high - low > SMALL * (free[axis][1] - free[axis][0]));
+  return (follow || isInside) && spans.some(([low, high], axis) => high - low > SMALL * (free[axis][1] - free[axis][0]));
 }
+
+/** An extent that holds some places, too. */
+export const including = (extent, places) =>
+  extent.map((ends, axis) => [Math.min, Math.max].map((end, at) => end(ends[at], ...places.map((place) => place[axis]))));
 
 const cornersOf = ([xs, ys]) => xs.flatMap((x) => ys.map((y) => [x, y]));
 

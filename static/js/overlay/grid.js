@@ -5,7 +5,8 @@ import { fixed } from "../units.js";
 
 const APART_PX = 70; // between lines, at least
 const MOST = 60; // lines each way: seen at a slant, the floor goes on and on
-const INSET = 6; // px, of the numbers from the edge
+const INSET = 6; // px, of the numbers from the lower edge
+const LEFT = 14; // px, from the left one, where the legend may hide them whole
 const BAR_PX = 120; // of the scale bar, at most
 
 /** The smallest of 1, 2, 5 times a power of ten, m, by which lines are far enough apart. */
@@ -56,7 +57,7 @@ function name(pen, { width, height }, [[x0, y0], [x1, y1]], words, style) {
     if (x > 30 && x < width - 30) pen.text([x, height - INSET], words, { ...style, anchor: "middle" });
   } else {
     const y = y0 + ((0 - x0) / (x1 - x0)) * (y1 - y0);
-    if (y > 20 && y < height - 24) pen.text([INSET, y - 4], words, style);
+    if (y > 20 && y < height - 24) pen.text([LEFT, y - 4], words, style);
   }
 }
 

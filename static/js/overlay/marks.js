@@ -1,11 +1,12 @@
 // What is drawn over the scene: marks with sizes of the screen, and outlines of ellipses on top of them.
 
-import { axesOf, drawable, outlineOf } from "./ellipses.js";
+import { axesOf, drawable, outlineOf, SIGMAS } from "./ellipses.js";
 import { placer } from "./world.js";
 
 const CORNER_PX = 6; // across
 const POINT_PX = 3;
 const LANDMARK_PX = 7;
+export const LANDMARK_SIGMAS = 10; // of their ellipses, which at one would be hidden by their marks
 const CROSS_PX = 4; // from the middle to an end
 const ARROW = [[-0.7, -0.6], [1, 0], [-0.7, 0.6]]; // of the sensor
 const ARROW_PX = 9;
@@ -19,16 +20,16 @@ const FEW = 40; // landmarks that have room for their numbers
 
 /**
  * Draws a world as it is seen by a look. `view` are the settings, `mask` the sectors left out, `selection` the ids
- * chosen, `hovered` all that is pointed at, `colours` those of methods and tokens. Returns how many ellipses are not drawn
- * at their size: {grown, shrunk}.
+ * chosen, `hovered` all that is pointed at, `colours` those of methods and tokens. Ellipses of
+ * corners and landmarks are enlarged, that of the sensor holds 95 %. Returns how many have another size: {grown, shrunk}.
  */
 export function drawMarks(pen, look, world, { view, mask, selection, hovered, colours }) {
   const { layers, ellipse_scale: scale } = view;
   const sizes = { grown: 0, shrunk: 0 };
   const ellipses = (entries) => drawEllipses(pen, look, entries, sizes);
-  if (layers.landmarks) drawLandmarks(pen, look, world, { ellipses, scale, colours });
+  if (layers.landmarks) drawLandmarks(pen, look, world, { ellipses, colours });
   if (layers.rejected) drawRejections(pen, look, world, colours);
-  if (layers.pose && world.frame.localization) drawPose(world, { ellipses, scale, colours });
+  if (layers.pose && world.frame.localization) drawPose(world, { ellipses, colours });
   if (layers.sensor) for (const sector of mask) drawSector(pen, look, world.sensor, sector, colours);
   if (layers.sensor) drawSensor(pen, look, world.sensor, colours);
   for (const corner of world.corners) {
@@ -79,13 +80,13 @@ function drawEllipses(pen, look, entries, sizes) {
   }
 }
 
-function drawLandmarks(pen, look, { frame, landmarks, tentative }, { ellipses, scale, colours }) {
+function drawLandmarks(pen, look, { frame, landmarks, tentative }, { ellipses, colours }) {
   for (const at of tentative) dot(pen, look, at, LANDMARK_PX, colours.tentative);
   for (const landmark of landmarks) {
     const age = Math.min(1, Math.max(0, (frame.stamp - landmark.last_seen) / FADED_S));
     const opacity = 1 - age * (1 - PALEST);
     dot(pen, look, landmark.at, LANDMARK_PX, colours.landmark, opacity);
-    ellipses([{ at: landmark.at, ...scaled(axesOf(landmark.covariance), scale), colour: colours.landmark, opacity }]);
+    ellipses([{ at: landmark.at, ...scaled(axesOf(landmark.covariance), LANDMARK_SIGMAS), colour: colours.landmark, opacity }]);
     if (landmarks.length <= FEW) label(pen, look, landmark.at, `L${landmark.id}`, colours);
   }
 }
@@ -99,9 +100,9 @@ function drawRejections(pen, look, { rejections }, { rejected }) {
   }
 }
 
-function drawPose({ frame, sensor }, { ellipses, scale, colours }) {
+function drawPose({ frame, sensor }, { ellipses, colours }) {
   const [[xx, xy], [, yy]] = frame.localization.covariance;
-  ellipses([{ at: sensor.at, ...scaled(axesOf([[xx, xy], [xy, yy]]), scale), colour: colours.trail }]);
+  ellipses([{ at: sensor.at, ...scaled(axesOf([[xx, xy], [xy, yy]]), SIGMAS), colour: colours.trail }]);
 }
 
 /** A wedge in which what is near is left out, as it is the robot itself. */
@@ -117,11 +118,13 @@ function drawSector(pen, look, { at, heading }, { first, last, reach }, { sensor
   pen.path(points, { stroke: sensor, width: 1, dash: [4, 3], closed: true });
 }
 
-function drawSensor(pen, look, { at, heading }, { sensor }) {
+function drawSensor(pen, look, { at, heading }, { sensor, halo }) {
   const reach = ARROW_PX / look.scale; // m
   const [c, s] = [Math.cos(heading), Math.sin(heading)];
   const ends = ARROW.map(([u, v]) => look.toScreen([at[0] + reach * (c * u - s * v), at[1] + reach * (s * u + c * v)]));
-  if (ends.every(Boolean)) pen.path(ends, { stroke: sensor, width: 2, closed: true });
+  if (!ends.every(Boolean)) return;
+  pen.path(ends, { stroke: halo, width: 3, closed: true });
+  pen.path(ends, { fill: sensor, closed: true });
 }
 
 /** What is selected, ringed; what is pointed at, ringed thinly. */

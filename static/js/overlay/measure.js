@@ -9,7 +9,7 @@ import { get, set } from "../store.js";
 import { degrees, metres, millimetres } from "../units.js";
 
 const HINT = "Click two corners or walls";
-const MIXED = "Only the scan shows one and only the map the other: click two of the scan, or two of the map";
+const MIXED = "One is only in the scan, the other only in the map: click two of the scan, or two of the map";
 
 /** Whether clicks measure; the store has {clicked, first, second, found} as "measure", null while they select. */
 export const isMeasuring = () => Boolean(get("measure"));
