@@ -45,6 +45,6 @@ class Serving:
         raise AssertionError(self.process.communicate())
 
     def end(self, number: int = signal.SIGINT) -> str:
-        """Press Ctrl-C, or send another signal; what it says about it. It has a minute to end, on a busy machine, too."""
+        """Press Ctrl-C, or send another signal; what it says about it. It has a minute to end, however busy it is."""
         self.process.send_signal(number)
         return self.process.communicate(timeout=60)[1]
