@@ -127,6 +127,16 @@ def test_a_sensor_that_moves_is_refused():
         calibrate(moving)
 
 
+@pytest.mark.parametrize("direction", [[0.01, 0.0], [0.0, 0.01], [0.006, 0.008]])
+def test_a_sensor_that_moves_along_walls_is_refused(direction):
+    """Walls along its way stay where they are; those at its ends go with it."""
+    sensor = SimulatedSensor(rectangular_room(4.5, 2.5), SensorNoise(0.005, 0.001))
+    rng, pose = np.random.default_rng(0), np.array([0.2, 0.1, 0.4])
+    moving = [sensor.scan(pose + np.array([*direction, 0.0]) * i, rng)[0] for i in range(30)]
+    with pytest.raises(EvaluationError, match="stands still"):
+        calibrate(moving)
+
+
 def test_a_wall_that_moves_alone_is_left_out():
     """One wall of four goes away by 2 mm a scan, as a door does. Kept, it would have drifted by 80 mm."""
     noise = SensorNoise(0.005, 0.001)

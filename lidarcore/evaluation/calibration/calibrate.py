@@ -16,6 +16,7 @@ from lidarcore.evaluation.calibration.variances import Bands, variance_model
 from lidarcore.evaluation.calibration.wall_beams import WallBeams, beams_on_walls
 from lidarcore.evaluation.calibration.white import Scatter, White, tails, white_parts, white_scatter
 from lidarcore.evaluation.intervals import Interval, share
+from lidarcore.geometry import unit_vectors
 from lidarcore.scan import Array, Scan
 
 LEAST_SCANS = 10
@@ -26,6 +27,7 @@ _START = (
     0.004  # m: walls are told apart by their unevenness, which is found from walls; at least as much as usual
 )
 _PASSES = 4
+_ACROSS = 0.1  # parallel walls say nothing of a motion along them
 _AGREE = 0.1
 
 
@@ -112,25 +114,30 @@ def _profiles(scans: list[Scan], assumed: float, white: White) -> list[Profile]:
 def _at_rest(beams: WallBeams, scans: int) -> tuple[WallBeams, float]:
     """Beams on walls that stay where they are, and how far (m) the one that moved most of these did so.
 
-    A door moves alone, and so does a wall that a person walks past. Raises EvaluationError if half of the beams meet
-    walls that moved: then the sensor did.
+    A door moves alone, and so does a wall that a person walks past. Raises EvaluationError if the sensor may have
+    moved: if no others stay that would have moved with it, with at least half as many beams.
     """
-    walls, of, beams_on = np.unique(beams.wall, return_inverse=True, return_counts=True)
-    moved = np.array([_moved(beams[beams.wall == wall], scans) for wall in walls])
-    at_rest = moved <= STILL
-    if 2 * beams_on[at_rest].sum() <= len(of):
-        raise EvaluationError(
-            f"{int((~at_rest).sum())} of {len(moved)} walls moved from the first scans to the last, one by "
-            f"{1e3 * moved.max():.0f} mm: calibration needs a sensor that stands still."
-        )
-    still = beams[at_rest[of]]
+    walls, first, of, on = np.unique(beams.wall, return_index=True, return_inverse=True, return_counts=True)
+    shifts = np.array([_shift(beams[beams.wall == wall], scans) for wall in walls])
+    moved = np.abs(shifts) > STILL
+    if moved.any():
+        normals = unit_vectors(beams.alpha[first])
+        by_sensor = normals @ np.linalg.lstsq(normals[moved], shifts[moved], rcond=_ACROSS)[0]
+        stayed = ~moved & (np.abs(by_sensor) > STILL)
+        if 2 * on[stayed].sum() < on[moved].sum():
+            raise EvaluationError(
+                f"A wall moved by {1e3 * np.abs(shifts).max():.0f} mm from the first scans to the last: calibration "
+                "needs a sensor that stands still, and walls that do."
+            )
+    still = beams[~moved[of]]
     numbered = np.unique(still.bin, return_inverse=True)[1].astype(np.int64)
-    return replace(still, bin=numbered), float(moved[at_rest].max())
+    return replace(still, bin=numbered), float(np.abs(shifts[~moved]).max())
 
 
-def _moved(wall: WallBeams, scans: int) -> float:
-    """How far (m) one wall moved from the first third of the scans to the last; 0 if it was not seen in both."""
+def _shift(wall: WallBeams, scans: int) -> float:
+    """How far (m) one wall went away from the first third of the scans to the last; 0 if it was not seen in both."""
     early, late = wall.scan < scans // 3, wall.scan >= scans - scans // 3
     if not (early.any() and late.any()):
         return 0.0
-    return abs(float(np.median(wall.error[late]) - np.median(wall.error[early])))
+    off = np.cos(wall.incidence) * wall.error
+    return float(np.median(off[late]) - np.median(off[early]))
