@@ -17,3 +17,8 @@ def trust(chi2: Numbers, doubtful: float) -> Numbers:
 
 
 compiled_trust = inlined(trust)
+
+
+def loss(chi2: float, doubtful: float) -> float:
+    """What a disagreement by chi2 costs: its derivative is `trust`, so that it never exceeds 3 times `doubtful`."""
+    return chi2 if chi2 < doubtful else doubtful * (3 - 4 / (1 + chi2 / doubtful))

@@ -8,6 +8,7 @@ from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
 from lidarcore.geometry import UncertainPose, relative
 from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
+from lidarcore.mapping.matching.odometry_calibration import OdometryCalibration
 from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, elapsed, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
@@ -32,6 +33,7 @@ class FrontEnd:
         self._before: tuple[float, Array | None] | None = None  # stamp and odometry
         self._first: Tracked | None = None  # until the second keyframe
         self._sweep = Sweep()
+        self._wheels = OdometryCalibration()
         self._motion, self._period = np.zeros(3), 0.0  # s between scans, as stamps of single scans jitter
 
     def step(self, scan: Scan, removed: Array | None = None) -> Tracked:
@@ -63,8 +65,8 @@ class FrontEnd:
                 registered = self._map.registered_again(seen, guess, registered.pose)
         rival = self._map.rival(seen, guess, registered)
         on = registered.inliers >= self._settings.inliers and rival is None
-        tie = self._map.tie(registered) if on else guess
-        tie = UncertainPose(tie.pose, tie.covariance + self._sweep.covariance)
+        matched = self._map.tie(registered) if on else guess
+        tie = UncertainPose(matched.pose, matched.covariance + self._sweep.covariance)
         if rival is not None:
             tie = self._map.either(registered, rival)
         island = len(seen.means) >= BLIND and not on and bool(tie.covariance[2, 2] > VAGUE**2)
@@ -77,6 +79,8 @@ class FrontEnd:
             self._sweep.removed, leaves, island, self._first if leaves else None,
         )  # fmt: skip
         if leaves:
+            if on and wheels is not None:
+                self._wheels.learn(moved, matched)
             self._first = None
             if island:
                 self._map.clear()
@@ -141,6 +145,7 @@ class FrontEnd:
                 f"Odometry jumped by {way:.3g} m in {dt:.3g} s, more than {most:.3g} m: leave the scan out, or raise "
                 f"max_step from {s.max_step:g} m."
             )
+        motion = self._wheels.corrected(motion)
         return dt, UncertainPose(motion, s.odometry.covariance(motion) + _FLOOR)
 
     def _leaves(self, pose: Array, inliers: float) -> bool:

@@ -6,18 +6,19 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
+from lidarcore.mapping.doubt import DOUBTFUL, loss
 from lidarcore.mapping.matching.correlative import arm, search
 from lidarcore.mapping.matching.patches import Patches, joined, placed
 from lidarcore.mapping.matching.registration import Registration, information_of, register
 from lidarcore.mapping.matching.surfels import Surfels, surfels
 from lidarcore.mapping.settings import FrontSettings
 
-BLIND = 20  # patches: nothing can be registered on a scan that has fewer
+BLIND = 20  # patches: a scan that has fewer fits anywhere
 SURE = 0.6  # share of a scan on the map from which on it needs no search
 _FURTHER = 3.0  # times as far is looked for a scan that does not fit
 _TURNED = 0.25  # rad from which on two poses are not the same
 _WIDE = 0.5  # m by which a point may be off where the search is needed in any case
-_BETTER = 0.02  # share of a scan by which a pose that was searched for must fit better than that of the guess
+_BETTER = 0.02  # share of a scan by which a pose that was searched for must be better than that of the guess
 _RIVAL = 0.85  # of the share of a scan on the map, from which on another pose is a rival
 _RIVALS = 3  # other poses that are looked at
 
@@ -52,6 +53,8 @@ class LocalMap:
         sigma = np.sqrt(np.diagonal(P))
         far = arm(seen.means) if len(seen.means) else 0.0
         registered = register(self._surfels, seen, x, x, prior, match.reach)
+        if len(seen.means) < BLIND:
+            return registered
         is_vague = 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE
         if registered.inliers < SURE or (is_vague and registered.inliers + _BETTER < 1):
             registered = self._searched(seen, x, sigma, prior, registered)
@@ -71,7 +74,9 @@ class LocalMap:
         match = self._settings.match
         start = search(self._surfels.means, seen.means, x, sigma, match)
         other = register(self._surfels, seen, start, x, prior, match.reach)
-        return other if other.inliers > registered.inliers + _BETTER else registered
+        n = len(seen.means)
+        better = _worth(other, n, x, prior) > _worth(registered, n, x, prior) + _BETTER * n
+        return other if better else registered
 
     def rival(self, seen: Patches, guess: UncertainPose, registered: Registration) -> Array | None:
         """Another pose (3,) at which a scan that fits badly fits nearly as well, if the guess leaves it open."""
@@ -102,3 +107,9 @@ class LocalMap:
         """The pose seen from the keyframe."""
         exact = UncertainPose(self._anchor, np.zeros((3, 3)))
         return exact.relative(UncertainPose(registered.pose, information_of(registered.information)))
+
+
+def _worth(registered: Registration, n: int, guess: Array, prior: Array) -> float:
+    """Log-likelihood of a pose: a patch of the n for each that fits, as in the search, less how far the guess is."""
+    off = pose_difference(registered.pose, guess)
+    return n * registered.inliers - loss(float(off @ prior @ off), DOUBTFUL) / 2
