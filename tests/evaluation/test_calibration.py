@@ -392,10 +392,17 @@ def test_words_say_where_one_number_fits_badly():
     said = remarks(scans)
     assert "Range noise" not in said
     assert "drifted" not in said
-    grows = remarks(rougher(scans, lambda ranges: 0.005 * ranges))
+    growing = calibrate(rougher(scans, lambda ranges: 0.001 * ranges**2))
+    assert growing.by_range.p_value < 0.01
+    assert not any("Range noise" in remark for remark in report(growing).remarks)  # the growth explains it
+    sigma_range, growth, sigma_bearing = growing.on_smooth_walls
+    constant = replace(growing, on_smooth_walls=(sigma_range, Interval(0, 0, growth.high), sigma_bearing))
+    grows = " ".join(report(constant).remarks)
     assert (
         "grows with distance: one number fits badly; ellipses of corners far away will be too small" in grows
     )
+    beyond = remarks(rougher(scans, lambda ranges: 0.0001 * np.exp(ranges)))
+    assert "differs with distance: sigma_range and range_growth fit badly" in beyond
     falls = remarks(rougher(scans, lambda ranges: 0.02 / ranges))
     assert "falls with distance: one number fits badly; ellipses of corners nearby will be too small" in falls
 
