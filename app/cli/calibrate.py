@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import RecordingPath, SettingsFile, Topic, check_folder, settings_from
+from .options import MOST, RecordingPath, SettingsFile, Topic, check_folder, settings_from
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,9 +30,9 @@ def calibrate(
             "-o", "--output", help="FILE.json for the noise; other commands read it with --settings"
         ),
     ] = None,
-    skip: Annotated[int, typer.Option(min=0, help="scans to skip at the beginning")] = 0,
+    skip: Annotated[int, typer.Option(min=0, max=MOST, help="scans to skip at the beginning")] = 0,
     scans: Annotated[
-        int | None, typer.Option(min=1, help="scans to take, 100 suffice; all if not given")
+        int | None, typer.Option(min=1, max=MOST, help="scans to take, 100 suffice; all if not given")
     ] = None,
     topic: Topic = None,
     settings: SettingsFile = None,

@@ -15,8 +15,12 @@ if TYPE_CHECKING:
 
 RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
 Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
-Seed = Annotated[int, typer.Option(min=0, help="seed of the random numbers")]
-Workers = Annotated[int | None, typer.Option(min=1, help="processes; one for each core if not given")]
+MOST = 1_000_000_000  # of whatever is counted: more than any recording holds
+
+Seed = Annotated[int, typer.Option(min=0, max=MOST, help="seed of the random numbers")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="processes; one for each core if not given")
+]
 Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="a setting, e.g. gap=0.2 or noise.sigma_range=0.01"),
