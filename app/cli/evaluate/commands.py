@@ -168,7 +168,7 @@ def repeatability(
     from lidarcore.evaluation.repeatability import tables as repeatability_tables
     from lidarcore.evaluation.repeatability.statistics import Repeatability
 
-    from .repeatability_table import tables
+    from .repeatability_table import remarks, tables
 
     if output is not None:
         consistency_tables.check(output)
@@ -183,9 +183,8 @@ def repeatability(
     console = _console()
     for shown in tables(summary):
         console.print(shown)
-    for message in dict.fromkeys((summary.message, summary.walls.message)):
-        if message is not None:
-            console.print(message)
+    for remark in remarks(summary):
+        console.print(remark)
     if output is not None:
         repeatability_tables.write(summary, output)
 

@@ -37,12 +37,9 @@ def reference_poses(scans: list[Scan]) -> tuple[Array, bool]:
     They are what a recording declares to be true or corrected: raw odometry is no reference.
     Raises EvaluationError if there are none, or their headings are not known.
     """
-    poses = [scan.truth for scan in scans]
+    poses, odometry = [scan.truth for scan in scans], [scan.odometry for scan in scans]
     if all(pose is not None and np.isfinite(pose).all() for pose in poses):
-        stand_in = all(
-            scan.odometry is not None and np.array_equal(scan.odometry, pose)
-            for scan, pose in zip(scans, poses, strict=True)
-        )
+        stand_in = all(pose is not None for pose in odometry) and np.array_equal(odometry, poses)
         return np.array(poses), stand_in
     if any(pose is None for pose in poses):
         raise EvaluationError(
