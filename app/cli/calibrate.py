@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import MOST, RecordingPath, SettingsFile, Topic, check_folder, settings_from
+from .options import MOST, RecordingPath, Set, SettingsFile, Topic, check_folder, settings_from
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,16 +36,18 @@ def calibrate(
     ] = None,
     topic: Topic = None,
     settings: SettingsFile = None,
+    set_: Set = None,
     json: Annotated[bool, typer.Option("--json", help="print JSON (m and rad) instead of a table")] = False,
 ) -> None:
     """Measure the noise of a sensor from a recording in which it stands still in a room.
 
-    Where one of its two numbers cannot be told, the file keeps that of --settings, or the default.
+    Where the noise of ranges or of bearings cannot be told, the file keeps that of --settings, or the default.
     """
     from pydantic import TypeAdapter
     from rich.console import Console
 
     from lidarcore import open_recording
+    from lidarcore.errors import EvaluationError
     from lidarcore.evaluation.calibration.calibrate import calibrate as run
     from lidarcore.evaluation.consistency import tables as consistency_tables
 
@@ -54,9 +56,15 @@ def calibrate(
     if output is not None:
         consistency_tables.check(output, (".json",))
         check_folder(output)
-    chosen = settings_from(settings, None)
+    chosen = settings_from(settings, set_)
     opened = open_recording(recording, topic, chosen.sensor.mask)
-    result = run(islice(opened, skip, None if scans is None else skip + scans))
+    taken = list(islice(opened, skip, None if scans is None else skip + scans))
+    if moved := [number for number in opened.stations if number > skip]:
+        raise EvaluationError(
+            f"From scan {moved[0]} on the sensor stood elsewhere: choose scans from one place with --skip and --scans; "
+            "`lidarcore evaluate stations` calibrates at each."
+        )
+    result = run(taken)
     found = report(result)
     if json:
         typer.echo(TypeAdapter(CalibrationReport).dump_json(found, indent=1))

@@ -6,6 +6,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -44,11 +45,38 @@ def end_like_ctrl_c() -> None:
 
 
 def check_folder(file: Path, option: str = "--output") -> None:
-    """Told before minutes of work are lost. Raises FileNotFoundError unless there can be a file of that name."""
+    """Told before minutes of work are lost. Raises OSError unless a file of that name can be written."""
     if file.is_dir() or not file.absolute().parent.is_dir():
         raise FileNotFoundError(
             errno.ENOENT, f"is not a file in a folder that exists; give one for {option}", str(file)
         )
+    _check_writable(file.absolute().parent, file, option)
+
+
+def check_new_folder(folder: Path, option: str = "--output") -> None:
+    """As `check_folder`, for a folder that may have to be made."""
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise NotADirectoryError(
+            errno.ENOTDIR,
+            f"cannot be a folder, since {there} is a file; give another one for {option}",
+            str(folder),
+        )
+    _check_writable(there, folder, option)
+
+
+def _check_writable(folder: Path, path: Path, option: str) -> None:
+    try:
+        TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise PermissionError(
+            errno.EACCES, f"cannot be written there; give another place for {option}", str(path)
+        ) from error
+
+
+def plural(number: int, noun: str) -> str:
+    """'1 scan', '2 scans'."""
+    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 @contextmanager
