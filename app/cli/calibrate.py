@@ -19,6 +19,17 @@ if TYPE_CHECKING:
 
     from ..jobs.calibration_report import BandsReport, CalibrationReport
 
+WRITTEN = (
+    ("sigma_range", 1e3, ", mm"),
+    ("sigma_bearing", 1e3, ", mrad"),
+    ("range_growth", 1e3, ", mm/m²"),
+    ("unevenness", 1e3, ", mm"),
+    ("unevenness_length", 1e3, ", mm"),
+    ("tails", 1.0, ""),
+    ("renewal", 1.0, ""),
+    ("resampling", 1.0, ""),
+)
+"""What a calibration writes into the settings, with factor and unit."""
 DEGREES = math.degrees(1)
 
 
@@ -116,6 +127,15 @@ def _table(found: "CalibrationReport") -> "Table":
     table.add_row("sigma_range, mm", *_known(found.sigma_range))
     _add_bands(table, "range", found.by_range, 1.0, "m")
     _add_bands(table, "incidence", found.by_incidence, DEGREES, "°")
+    table.add_section()
+    table.add_row("range_growth, mm/m²", *_cells(found.range_growth))
+    table.add_row("unevenness, mm", *_cells(found.unevenness))
+    table.add_row("unevenness_length, mm", *_cells(found.unevenness_length))
+    table.add_section()
+    table.add_row("in the settings:", "")
+    for name, factor, unit in WRITTEN:
+        value = getattr(found.noise, name)
+        table.add_row(f"  {name}{unit}", "as set" if value is None else f"{factor * value:.2f}")
     table.add_section()
     table.add_row("range bias, mm", *_cells(found.range_bias))
     table.add_row("alignment, °", *_cells(found.alignment, DEGREES))

@@ -259,7 +259,13 @@ def test_the_command_writes_a_noise_that_extraction_takes(data, tmp_path):
     arguments = ["calibrate", str(recording), "--skip", "5", "--scans", "100", "-o", str(profile)]
     result = CliRunner().invoke(cli, arguments, env={"COLUMNS": "120"})
     assert result.exit_code == 0, result.output
-    for row in ("sigma_bearing, mrad", "sigma_range, mm", "range bias, mm", "alignment, °"):
+    for row in (
+        "sigma_bearing, mrad",
+        "sigma_range, mm",
+        "unevenness_length, mm",
+        "resampling",
+        "alignment, °",
+    ):
         assert row in result.output
     assert "sensor's x axis" in result.output.replace("\n", " ")
     scans = list(islice(open_recording(recording), 5, 105))

@@ -29,7 +29,7 @@ def remarks(summary: Summary) -> Iterator[str]:
     if any(has_other_tails(claim.judgement) for claim in claims):
         yield (
             "neither: ellipses of 50 % and of 95 % are wrong in opposite ways, so that no size makes both true. The "
-            "scatter has other tails than a Gaussian: see whether something moved, or calibrate: that measures the tails."
+            "scatter has other tails than a Gaussian: see whether something moved; a calibration measures them."
         )
 
 

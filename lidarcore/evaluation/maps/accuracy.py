@@ -37,18 +37,19 @@ def reference_poses(scans: list[Scan]) -> tuple[Array, bool]:
     They are what a recording declares to be true or corrected: raw odometry is no reference.
     Raises EvaluationError if there are none, or their headings are not known.
     """
-    poses, odometry = [scan.truth for scan in scans], [scan.odometry for scan in scans]
-    if all(pose is not None and np.isfinite(pose).all() for pose in poses):
-        stand_in = all(pose is not None for pose in odometry) and np.array_equal(odometry, poses)
-        return np.array(poses), stand_in
-    if any(pose is None for pose in poses):
+    poses = [scan.truth for scan in scans if scan.truth is not None]
+    odometry = [scan.odometry for scan in scans if scan.odometry is not None]
+    if len(poses) < len(scans):
         raise EvaluationError(
             "The recording has no reference poses, true or corrected ones for all scans: there is nothing to "
             "compare the map with."
         )
-    raise EvaluationError(
-        "The recording knows positions but no headings: that is no reference to compare the map with."
-    )
+    reference = np.array(poses)
+    if not np.isfinite(reference).all():
+        raise EvaluationError(
+            "The recording knows positions but no headings: that is no reference to compare the map with."
+        )
+    return reference, len(odometry) == len(scans) and np.array_equal(np.array(odometry), reference)
 
 
 def name_of_reference(scans: list[Scan]) -> str:
