@@ -1,5 +1,6 @@
 """What `import lidarcore` offers, what it loads, and how its objects show themselves."""
 
+import pydoc
 import subprocess
 import sys
 
@@ -37,3 +38,11 @@ def test_what_was_found_and_read_shows_what_it_is(tmp_path):
     path = tmp_path / "room.npz"
     np.savez(path, ranges=ranges, bearings=bearings)
     assert repr(open_recording(path)) == f"<NumPy .npz {path}>"
+
+
+@pytest.mark.parametrize("settings", [lidarcore.SensorNoise, lidarcore.ExtractionSettings])
+def test_help_on_settings_begins_with_names_and_defaults(settings):
+    shown = pydoc.render_doc(settings, renderer=pydoc.plaintext)
+    signature = shown.split("\n\n")[1]
+    assert "sigma_range=0.02" in signature or "fitter='ml'" in signature
+    assert "Annotated" not in signature.splitlines()[1]
