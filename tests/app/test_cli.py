@@ -19,6 +19,7 @@ from serving import ROOT, write_room
 
 import lidarcore
 from lidarcore import ExtractionSettings, compare, open_recording
+from lidarcore.mapping.grid import build_grid, write_ros_map
 
 
 def test_help_is_instant_and_names_every_command() -> None:
@@ -291,3 +292,17 @@ def test_a_calibration_across_stations_says_how_to_choose_one(tmp_path: Path) ->
 def test_one_is_not_many(tmp_path: Path) -> None:
     room = write_room(tmp_path / "room.npz", scans=1)
     assert run("process", room, "-o", tmp_path / "out.csv").stdout.endswith(" of 1 scan\n")
+
+
+def test_localizing_where_nothing_fits_says_why(tmp_path: Path) -> None:
+    """The map is given as a folder, as `lidarcore map` writes one."""
+    room = write_room(tmp_path / "room.npz", scans=1)
+    (tmp_path / "map").mkdir()
+    grid = build_grid(list(open_recording(room)), np.zeros((1, 3)))
+    write_ros_map(grid, tmp_path / "map" / "map.yaml")
+    bearings = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    np.savez(tmp_path / "round.npz", ranges=np.full((5, 360), 9.0), bearings=bearings)
+    result = run("localize", tmp_path / "round.npz", "--map", tmp_path / "map")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith("No pose was found. ")
+    assert result.stdout.endswith("5 scans, 0 of them tracked.\n")

@@ -39,15 +39,15 @@ def reference_poses(scans: list[Scan]) -> tuple[Array, bool]:
     """
     poses = [scan.truth for scan in scans if scan.truth is not None]
     odometry = [scan.odometry for scan in scans if scan.odometry is not None]
-    if len(poses) < len(scans):
-        raise EvaluationError(
-            "The recording has no reference poses, true or corrected ones for all scans: there is nothing to "
-            "compare the map with."
-        )
     reference = np.array(poses)
     if not np.isfinite(reference).all():
         raise EvaluationError(
             "The recording knows positions but no headings: that is no reference to compare the map with."
+        )
+    if len(poses) < len(scans):
+        raise EvaluationError(
+            "The recording has no reference poses, true or corrected ones for all scans: there is nothing to "
+            "compare the map with."
         )
     return reference, len(odometry) == len(scans) and np.array_equal(np.array(odometry), reference)
 
