@@ -34,14 +34,18 @@ class InvalidValues(Protocol):
 
 
 _PLACES = ("body", "query", "path")  # of a request: what the value is called says enough
+_NO_BODY = ("missing", "dict_type", "model_attributes_type")
 
 
 def invalid_values(error: InvalidValues) -> list[tuple[list[str], str]]:
     """Every value that is not valid: the names that lead to it, and what is wrong with it."""
-    return [
-        ([str(part) for part in e["loc"] if part not in _PLACES], e["msg"].removeprefix("Value error, "))
-        for e in error.errors()
-    ]
+    return [([str(part) for part in e["loc"] if part not in _PLACES], _wrong(e)) for e in error.errors()]
+
+
+def _wrong(error: Any) -> str:
+    if error["loc"] == ("body",) and error["type"] in _NO_BODY:
+        return "Send a JSON body, with the header Content-Type: application/json."
+    return str(error["msg"]).removeprefix("Value error, ")
 
 
 def explained(error: InvalidValues) -> str:

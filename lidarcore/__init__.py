@@ -3,6 +3,8 @@
 Metres, radians, seconds; x forward, y left, angles counter-clockwise (REP-103).
 """
 
+from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from lidarcore.arrays import Array, Ints
@@ -26,6 +28,12 @@ from lidarcore.tracking import CornerRow, Tracker
 
 if TYPE_CHECKING:
     from lidarcore.client import Client
+    from lidarcore.evaluation.calibration.calibrate import calibrate
+    from lidarcore.localization import Navigator
+    from lidarcore.mapping import Mapper
+    from lidarcore.rplidar import Driver
+
+__version__: str
 
 __all__ = [
     "FITTERS",
@@ -36,12 +44,15 @@ __all__ = [
     "Corners",
     "DegenerateLineError",
     "DeviceError",
+    "Driver",
     "ExtractionSettings",
     "Features",
     "Ints",
     "LidarError",
     "Line",
     "Lines",
+    "Mapper",
+    "Navigator",
     "RecordingError",
     "Rejection",
     "Scan",
@@ -52,6 +63,7 @@ __all__ = [
     "TopicError",
     "Tracker",
     "body_mask",
+    "calibrate",
     "compare",
     "errors",
     "extract",
@@ -63,10 +75,19 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    """The client on demand: most who import lidarcore need no HTTP."""
-    if name != "Client":
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from lidarcore.client import Client
+_ON_DEMAND = {
+    "Client": "lidarcore.client",
+    "Driver": "lidarcore.rplidar",
+    "Mapper": "lidarcore.mapping",
+    "Navigator": "lidarcore.localization",
+    "calibrate": "lidarcore.evaluation.calibration.calibrate",
+}
 
-    return Client
+
+def __getattr__(name: str) -> Any:
+    """What not all need, on demand: importing lidarcore loads neither HTTP nor filters nor maps."""
+    if name == "__version__":
+        return version("lidarcore")
+    if name not in _ON_DEMAND:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_ON_DEMAND[name]), name)

@@ -28,6 +28,9 @@ class _View:
     def __len__(self) -> int:
         return len(self._table)
 
+    def __repr__(self) -> str:
+        return f"<{len(self)} {type(self).__name__.lower()}, {self._which} covariances>"
+
     def _matrices(self, column: int) -> Array:
         return self._table[:, column : column + 4].reshape(-1, 2, 2)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from lidarcore.fields import plainly
 from lidarcore.geometry import rotated_covariance
 
 Metres = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False, json_schema_extra={"unit": "m"})]
@@ -42,6 +43,7 @@ class NoiseModel(NamedTuple):
     latent: bool = False
 
 
+@plainly
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True)
 class SensorNoise:
     """Standard deviations of one beam, of the walls it meets and of what stays the same in every scan.

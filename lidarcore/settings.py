@@ -9,13 +9,14 @@ from typing import Annotated, Literal
 from pydantic import ConfigDict, Field, field_validator
 from pydantic.dataclasses import dataclass
 
-from lidarcore.fields import number
+from lidarcore.fields import number, plainly
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise
 
 Covariance = Literal["consistent", "published", "map"]
 
 
+@plainly
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
 class ExtractionSettings:
     """How a scan becomes segments and corners. Metres and radians; immutable, so a scan never sees a half change.

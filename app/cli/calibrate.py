@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import RecordingPath, SettingsFile, Topic, check_folder, settings_from
+from .options import MOST, RecordingPath, Set, SettingsFile, Topic, check_folder, settings_from
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -19,6 +19,17 @@ if TYPE_CHECKING:
 
     from ..jobs.calibration_report import BandsReport, CalibrationReport
 
+WRITTEN = (
+    ("sigma_range", 1e3, ", mm"),
+    ("sigma_bearing", 1e3, ", mrad"),
+    ("range_growth", 1e3, ", mm/m²"),
+    ("unevenness", 1e3, ", mm"),
+    ("unevenness_length", 1e3, ", mm"),
+    ("tails", 1.0, ""),
+    ("renewal", 1.0, ""),
+    ("resampling", 1.0, ""),
+)
+"""What a calibration writes into the settings, with factor and unit."""
 DEGREES = math.degrees(1)
 
 
@@ -30,22 +41,24 @@ def calibrate(
             "-o", "--output", help="FILE.json for the noise; other commands read it with --settings"
         ),
     ] = None,
-    skip: Annotated[int, typer.Option(min=0, help="scans to skip at the beginning")] = 0,
+    skip: Annotated[int, typer.Option(min=0, max=MOST, help="scans to skip at the beginning")] = 0,
     scans: Annotated[
-        int | None, typer.Option(min=1, help="scans to take, 100 suffice; all if not given")
+        int | None, typer.Option(min=1, max=MOST, help="scans to take, 100 suffice; all if not given")
     ] = None,
     topic: Topic = None,
     settings: SettingsFile = None,
+    set_: Set = None,
     json: Annotated[bool, typer.Option("--json", help="print JSON (m and rad) instead of a table")] = False,
 ) -> None:
     """Measure the noise of a sensor from a recording in which it stands still in a room.
 
-    Where one of its two numbers cannot be told, the file keeps that of --settings, or the default.
+    Where the noise of ranges or of bearings cannot be told, the file keeps that of --settings, or the default.
     """
     from pydantic import TypeAdapter
     from rich.console import Console
 
     from lidarcore import open_recording
+    from lidarcore.errors import EvaluationError
     from lidarcore.evaluation.calibration.calibrate import calibrate as run
     from lidarcore.evaluation.consistency import tables as consistency_tables
 
@@ -54,9 +67,15 @@ def calibrate(
     if output is not None:
         consistency_tables.check(output, (".json",))
         check_folder(output)
-    chosen = settings_from(settings, None)
+    chosen = settings_from(settings, set_)
     opened = open_recording(recording, topic, chosen.sensor.mask)
-    result = run(islice(opened, skip, None if scans is None else skip + scans))
+    taken = list(islice(opened, skip, None if scans is None else skip + scans))
+    if moved := [number for number in opened.stations if number > skip]:
+        raise EvaluationError(
+            f"From scan {moved[0]} on the sensor stood elsewhere: choose scans from one place with --skip and --scans; "
+            "`lidarcore evaluate stations` calibrates at each."
+        )
+    result = run(taken)
     found = report(result)
     if json:
         typer.echo(TypeAdapter(CalibrationReport).dump_json(found, indent=1))
@@ -108,6 +127,15 @@ def _table(found: "CalibrationReport") -> "Table":
     table.add_row("sigma_range, mm", *_known(found.sigma_range))
     _add_bands(table, "range", found.by_range, 1.0, "m")
     _add_bands(table, "incidence", found.by_incidence, DEGREES, "°")
+    table.add_section()
+    table.add_row("range_growth, mm/m²", *_cells(found.range_growth))
+    table.add_row("unevenness, mm", *_cells(found.unevenness))
+    table.add_row("unevenness_length, mm", *_cells(found.unevenness_length))
+    table.add_section()
+    table.add_row("in the settings:", "")
+    for name, factor, unit in WRITTEN:
+        value = getattr(found.noise, name)
+        table.add_row(f"  {name}{unit}", "as set" if value is None else f"{factor * value:.2f}")
     table.add_section()
     table.add_row("range bias, mm", *_cells(found.range_bias))
     table.add_row("alignment, °", *_cells(found.alignment, DEGREES))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Seed, Topic, Workers, check_folder, end_like_ctrl_c
+from .options import MOST, Seed, Topic, Workers, check_folder, end_like_ctrl_c
 from .progress import ForPrograms, counted
 
 if TYPE_CHECKING:
@@ -36,7 +36,8 @@ Recording = Annotated[
     typer.Option(help="a recording of a sensor at rest, in place of the simulated rooms", exists=True),
 ]
 Scans = Annotated[
-    int | None, typer.Option(min=10, help="scans of each room, 2000 if not given; or of the recording, all")
+    int | None,
+    typer.Option(min=10, max=MOST, help="scans of each room, 2000 if not given; or of the recording, all"),
 ]
 SigmaRange = Annotated[
     float | None,
@@ -114,7 +115,8 @@ def clustering_ekf(
     output: Output = Path("clustering-ekf.html"),
     seed: Seed = 0,
     runs: Annotated[
-        int | None, typer.Option(min=1, help="drives along each trajectory; 20 if not given, 2 with --quick")
+        int | None,
+        typer.Option(min=1, max=MOST, help="drives along each trajectory; 20 if not given, 2 with --quick"),
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="only one scan a second, to try it out")] = False,
     workers: Workers = None,

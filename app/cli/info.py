@@ -13,11 +13,13 @@ def summarise(recording: Recording) -> Iterator[tuple[str, str]]:
     """Names and values, after reading all of it. Raises RecordingError if it cannot be read."""
     beams, stamps = array("l"), array("d")  # lists would take more than a file of tiny scans
     valid, shortest, longest, odometry = 0, np.inf, 0.0, 0
+    first, last = np.inf, -np.inf
     for scan in recording:
         beams.append(len(scan))
         valid += int(scan.valid.sum())
         found = scan.ranges[scan.valid]
         shortest, longest = found.min(initial=shortest), found.max(initial=longest)
+        first, last = scan.bearings.min(initial=first), scan.bearings.max(initial=last)
         stamps.append(scan.stamp)
         odometry += scan.odometry is not None
     yield "format", recording.name
@@ -27,6 +29,7 @@ def summarise(recording: Recording) -> Iterator[tuple[str, str]]:
     yield "scans", str(len(beams))
     yield "duration", _duration(np.frombuffer(stamps))
     yield "beams per scan", f"{min(beams)} to {max(beams)}, median {np.median(beams):.0f}"
+    yield "bearings", f"{np.degrees(first):.1f} to {np.degrees(last):.1f} degrees"
     yield "returns", f"{100 * valid / sum(beams):.1f} %"
     yield "ranges", f"{shortest:.3f} to {longest:.3f} m" if valid else "none"
     yield "odometry", f"in {odometry} scans" if odometry else "none"

@@ -1,6 +1,6 @@
 """A whole recording's poses, and the map that they make or lie in, into files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,6 +18,8 @@ from lidarcore.recordings import Recording
 from ..pipeline.settings import Settings
 from ..pipeline.tables import csv_text
 
+GRIDS = (".yaml", ".yml")
+
 COLUMNS = (
     "stamp", "state", "x", "y", "heading", "var_x", "cov_xy", "cov_x_heading", "var_y", "cov_y_heading", "var_heading",
     "matched", "nis", "dof",
@@ -26,12 +28,16 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a recording gave: columns of the poses, how many scans, how many of them tracked, and landmarks, if any."""
+    """What a recording gave: columns of the poses, how many scans, how many of them tracked, and landmarks, if any.
+
+    message is what was wrong at the last scan, or None.
+    """
 
     columns: dict[str, list[object]]
     scans: int
     tracked: int
     landmarks: Landmarks | None
+    message: str | None
 
 
 def track(
@@ -39,23 +45,27 @@ def track(
 ) -> Outcome:
     """Take all scans of a recording; `progress` is told the number of scans. Raises RecordingError."""
     columns: dict[str, list[object]] = {name: [] for name in COLUMNS}
-    tracked = 0
+    tracked, message = 0, None
     for number, scan in enumerate(recording, 1):
         found = _step(tracker, scan, settings)
         for name, value in zip(COLUMNS, _row(found), strict=True):
             columns[name].append(value)
         tracked += found.state == "tracking"
+        message = found.message
         progress(number)
     landmarks = tracker.landmarks if isinstance(tracker, Navigator) else None
-    return Outcome(columns, len(columns["stamp"]), tracked, landmarks)
+    return Outcome(columns, len(columns["stamp"]), tracked, landmarks, message)
 
 
 def tracker_in(path: Path | None, settings: Settings) -> Navigator | WholeScans:
     """What localizes in the map of a file, or builds one by SLAM. Raises MapFileError, LandmarkMapError or OSError."""
     if path is None:
         return Navigator(replace(settings.navigation, mode="slam"))
-    if path.suffix.lower() in (".yaml", ".yml"):
+    if path.is_dir():
+        path = path / "map.yaml"
+    if path.suffix.lower() in GRIDS:
         return WholeScans(settings.extraction, known=MapPicture(read_ros_map(path)), background=False)
+    format_of(path, GRIDS)
     return Navigator(replace(settings.navigation, mode="localize"), read_map(path))
 
 
@@ -76,13 +86,12 @@ def write_poses(path: Path, outcome: Outcome) -> None:
     write(path, csv_text(outcome.columns))
 
 
-def format_of(path: Path) -> str:
-    """The format of a map file by its suffix. Raises RecordingError."""
+def format_of(path: Path, others: Sequence[str] = ()) -> str:
+    """The format of a file of landmarks by its suffix; `others` would do as well. Raises RecordingError."""
     name = path.suffix.lower().removeprefix(".")
     if name not in FORMATS:
-        raise RecordingError(
-            f"{path.name} should end in one of {', '.join('.' + known for known in FORMATS)}."
-        )
+        endings = (*(f".{known}" for known in FORMATS), *others)
+        raise RecordingError(f"{path.name} should end in one of {', '.join(endings)}.")
     return name
 
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, counting, plural, settings_from
 
 
 def localize(
@@ -17,7 +17,7 @@ def localize(
             "--map",
             metavar="FILE",
             help="to localize in: landmarks (.json, .csv, .geojson) or a grid (.yaml, as ROS and `lidarcore map` write "
-            "it); without, SLAM builds one",
+            "it), or the folder of the latter; without, SLAM builds one",
         ),
     ] = None,
     save_map: Annotated[
@@ -38,14 +38,21 @@ def localize(
     from .localization_run import format_of, track, tracker_in, write_map, write_poses
 
     chosen = settings_from(settings, set_)
-    tracker = tracker_in(known, chosen)
+    if output is not None:
+        check_folder(output)
     if save_map is not None:
         format_of(save_map)
+        check_folder(save_map, "--save-map")
+    tracker = tracker_in(known, chosen)
     with counting("scans") as count:
         outcome = track(open_recording(recording, topic, chosen.sensor.mask), tracker, chosen, count)
     if output is not None:
         write_poses(output, outcome)
     if save_map is not None and outcome.landmarks is not None:
         write_map(save_map, outcome.landmarks, chosen.landmark_method)
-    found = "" if outcome.landmarks is None else f"; {int(outcome.landmarks.confirmed.sum())} landmarks"
-    typer.echo(f"{outcome.scans} scans, {outcome.tracked} of them tracked{found}.")
+    found = (
+        "" if outcome.landmarks is None else "; " + plural(int(outcome.landmarks.confirmed.sum()), "landmark")
+    )
+    if not outcome.tracked and outcome.message is not None:
+        typer.echo(f"No pose was found. {outcome.message}")
+    typer.echo(f"{plural(outcome.scans, 'scan')}, {outcome.tracked} of them tracked{found}.")

@@ -14,17 +14,34 @@ from .evaluate import evaluate
 from .experiment import experiment
 from .localize import localize
 from .map import map_recording
-from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, counting, plural, settings_from
 from .record import record
 from .serve import serve
 
 cli = typer.Typer(
     name="lidarcore",
-    help="2D lidar scans to walls and corners with honest covariances: live in the browser, or into a file.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"lidarcore {version('lidarcore')}")
+        raise typer.Exit
+
+
+@cli.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="print the version")
+    ] = False,
+) -> None:
+    """2D lidar scans to walls and corners with honest covariances: live in the browser, or into a file."""
 
 
 @cli.command()
@@ -41,6 +58,7 @@ def process(
 
     from .process import process as run
 
+    check_folder(output)
     chosen = settings_from(settings, set_)
     fitters = [chosen.patched({"extraction": {"fitter": name}}).extraction.fitter for name in fitter or []]
     with counting("scans") as count:
@@ -51,7 +69,8 @@ def process(
             fitters or [chosen.extraction.fitter],
             lambda so_far: count(so_far.scans),
         )
-    typer.echo(f"{output}: {counts.segments} segments and {counts.corners} corners of {counts.scans} scans")
+    found = f"{plural(counts.segments, 'segment')} and {plural(counts.corners, 'corner')}"
+    typer.echo(f"{output}: {found} of {plural(counts.scans, 'scan')}")
 
 
 @cli.command()

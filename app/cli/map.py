@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from .options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from .options import (
+    RecordingPath,
+    Set,
+    SettingsFile,
+    Topic,
+    check_new_folder,
+    counting,
+    plural,
+    settings_from,
+)
 
 
 def map_recording(
@@ -26,13 +35,14 @@ def map_recording(
 
     from .map_run import build, write_files
 
+    check_new_folder(output)
     chosen = settings_from(settings, set_)
     opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans") as count:
         built = build(opened, chosen, count)
     walls = write_files(output, built, chosen)
     typer.echo(
-        f"{output}: {len(built.states)} scans, {built.states.count('tracking')} of them tracked; "
-        f"{len(built.mapper.keyframes.scans)} keyframes, {len(built.mapper.loops)} loops; "
-        f"{len(walls)} walls, {walls.length.sum():.0f} m."
+        f"{output}: {plural(len(built.states), 'scan')}, {built.states.count('tracking')} of them tracked; "
+        f"{plural(len(built.mapper.keyframes.scans), 'keyframe')}, {plural(len(built.mapper.loops), 'loop')}; "
+        f"{plural(len(walls), 'wall')}, {walls.length.sum():.0f} m."
     )

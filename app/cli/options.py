@@ -6,6 +6,7 @@ import signal
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,8 +16,12 @@ if TYPE_CHECKING:
 
 RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
 Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
-Seed = Annotated[int, typer.Option(min=0, help="seed of the random numbers")]
-Workers = Annotated[int | None, typer.Option(min=1, help="processes; one for each core if not given")]
+MOST = 1_000_000_000  # of whatever is counted: more than any recording holds
+
+Seed = Annotated[int, typer.Option(min=0, max=MOST, help="seed of the random numbers")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="processes; one for each core if not given")
+]
 Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="a setting, e.g. gap=0.2 or noise.sigma_range=0.01"),
@@ -40,11 +45,38 @@ def end_like_ctrl_c() -> None:
 
 
 def check_folder(file: Path, option: str = "--output") -> None:
-    """Told before minutes of work are lost. Raises FileNotFoundError unless there can be a file of that name."""
+    """Told before minutes of work are lost. Raises OSError unless a file of that name can be written."""
     if file.is_dir() or not file.absolute().parent.is_dir():
         raise FileNotFoundError(
             errno.ENOENT, f"is not a file in a folder that exists; give one for {option}", str(file)
         )
+    _check_writable(file.absolute().parent, file, option)
+
+
+def check_new_folder(folder: Path, option: str = "--output") -> None:
+    """As `check_folder`, for a folder that may have to be made."""
+    there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise NotADirectoryError(
+            errno.ENOTDIR,
+            f"cannot be a folder, since {there} is a file; give another one for {option}",
+            str(folder),
+        )
+    _check_writable(there, folder, option)
+
+
+def _check_writable(folder: Path, path: Path, option: str) -> None:
+    try:
+        TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise PermissionError(
+            errno.EACCES, f"cannot be written there; give another place for {option}", str(path)
+        ) from error
+
+
+def plural(number: int, noun: str) -> str:
+    """'1 scan', '2 scans'."""
+    return f"{number} {noun}" + ("" if number == 1 else "s")
 
 
 @contextmanager

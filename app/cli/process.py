@@ -117,8 +117,6 @@ def process(
         raise RecordingError(
             f"{output.name} should end in one of {', '.join(WRITERS)}, which says the format."
         )
-    if not output.parent.is_dir():
-        raise RecordingError(f"There is no folder {output.parent} to write {output.name} into.")
     if output.exists() and any(output.samefile(path) for path in (recording.path, *recording.path.glob("*"))):
         raise RecordingError(f"{output} is the recording itself: write into another file.")
     counts, batch = Counts(), _Batch()

@@ -24,7 +24,7 @@ def record(
     output: Annotated[Path, typer.Argument(help="FILE.mcap, which must not exist yet")],
     port: Annotated[str | None, typer.Option(help="serial port; the connected RPLIDAR if not given")] = None,
     baud: Annotated[
-        int, typer.Option(min=1, help="baud rate of the sensor; that of an S1 is 256000")
+        int, typer.Option(min=1, max=10_000_000, help="baud rate of the sensor; that of an S1 is 256000")
     ] = 256000,
     mode: Annotated[
         str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")

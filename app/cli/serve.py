@@ -23,7 +23,10 @@ SerialPort = Annotated[
         help="serial port of the sensor, such as /dev/ttyUSB0; a mere number is taken as --http-port"
     ),
 ]
-Baud = Annotated[int | None, typer.Option(min=1200, help="baud rate of the sensor; 256000 if not given")]
+Baud = Annotated[
+    int | None,
+    typer.Option(min=1200, max=10_000_000, help="baud rate of the sensor; 256000 if not given"),
+]
 Mode = Annotated[
     str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")
 ]
@@ -38,7 +41,7 @@ MapFile = Annotated[
         help="file of landmark maps; landmarks.db beside the folder of recordings if not given",
     ),
 ]
-MaxUpload = Annotated[int, typer.Option(min=1, help="largest upload, MB")]
+MaxUpload = Annotated[int, typer.Option(min=1, max=1_000_000, help="largest upload, MB")]
 Token = Annotated[
     str | None,
     typer.Option(

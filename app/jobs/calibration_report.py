@@ -1,13 +1,16 @@
 """What a calibration found, with what it means in words: the same for the command, REST and the page."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from lidarcore.evaluation.calibration.result import Calibration
 from lidarcore.evaluation.calibration.variances import Bands
 from lidarcore.evaluation.intervals import Interval
 
 DIFFERENT = 0.01  # p-value below which bands are said to differ
+ONE = "one number fits"
 TELLING = 0.05  # m, half-width of the interval of a range bias beyond which it is not told
 
 
@@ -87,8 +90,8 @@ def report(found: Calibration) -> CalibrationReport:
             *_on_sigma("bearing", found.sigma_bearing, (1e3, 2, " mrad"), (math.degrees(1), 3, "°")),
             *_on_precision(found),
             *_on_unevenness(found.unevenness, found.noise.unevenness),
-            *_on_bands(found.by_range, "distance", "nearby", "far away"),
-            *_on_bands(found.by_incidence, "incidence", "that beams meet squarely", "that beams graze"),
+            *_on_ranges(found),
+            *_on_incidence(found),
             *_on_drift(found.drift, found.sigma_range),
             _on_bias(bias),
             _on_alignment(found.alignment),
@@ -153,20 +156,53 @@ def _on_unevenness(size: Interval, reckoned_with: float) -> list[str]:
     ]
 
 
-def _on_bands(bands: Bands, name: str, first: str, last: str) -> list[str]:
-    """Whose ellipses are wrong, where the intervals of the first and the last band say so."""
+def _on_ranges(found: Calibration) -> list[str]:
+    """On what the growth that was fitted, if any, leaves of the differences with distance."""
+    growth, bands = found.range_growth, found.by_range
+    if found.noise.range_growth == 0:
+        return _on_bands(bands, ONE, "distance", "nearby", "far away")
+    near, far = np.square(bands.edges[:-1]), np.square(bands.edges[1:])
+    left = tuple(
+        Interval(
+            _rest(sigma.value, growth.value * (a + b) / 2),
+            _rest(sigma.low, growth.high * b),
+            _rest(sigma.high, growth.low * a),
+        )
+        for sigma, a, b in zip(bands.sigmas, near, far, strict=True)
+    )
+    return _on_bands(
+        replace(bands, sigmas=left), "sigma_range and range_growth fit", "distance", "nearby", "far away"
+    )
+
+
+def _on_incidence(found: Calibration) -> list[str]:
+    """On differences with incidence; where noise grows with distance, they may be of walls that are farther away."""
+    if found.noise.range_growth > 0:
+        return []
+    return _on_bands(found.by_incidence, ONE, "incidence", "that beams meet squarely", "that beams graze")
+
+
+def _rest(sigma: float, part: float) -> float:
+    """The standard deviation that is left of sigma without a part of its variance."""
+    return math.sqrt(max(sigma**2 - part**2, 0))
+
+
+def _on_bands(bands: Bands, fit: str, name: str, first: str, last: str) -> list[str]:
+    """Whose ellipses are wrong, where the intervals of the first and the last band say so; `fit`, what fits badly."""
     if not _differs(bands):
         return []
     low, *_, high = bands.sigmas
     if high.low > low.high:
-        return [_badly(f"grows with {name}", last)]
+        return [_badly(f"grows with {name}", fit, last)]
     if high.high < low.low:
-        return [_badly(f"falls with {name}", first)]
-    return [f"Range noise differs with {name}: one number fits badly."]
+        return [_badly(f"falls with {name}", fit, first)]
+    if max(sigma.low for sigma in bands.sigmas) > min(sigma.high for sigma in bands.sigmas):
+        return [f"Range noise differs with {name}: {fit} badly."]
+    return []
 
 
-def _badly(how: str, where: str) -> str:
-    return f"Range noise {how}: one number fits badly; ellipses of corners {where} will be too small."
+def _badly(how: str, fit: str, where: str) -> str:
+    return f"Range noise {how}: {fit} badly; ellipses of corners {where} will be too small."
 
 
 def _on_drift(drift: float, sigma_range: Interval) -> list[str]:

@@ -1,13 +1,14 @@
 """Everything a user can set: one frozen object, swapped whole, changed only through `Settings.patched`."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
+from difflib import get_close_matches
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 from pydantic.dataclasses import dataclass
-from pydantic_core import InitErrorDetails
+from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from lidarcore import FITTERS, ExtractionSettings, SensorNoise
 from lidarcore.body_mask import Mask
@@ -186,11 +187,18 @@ class Settings(_Frozen):
         return Settings.model_validate_json(json.dumps(merged), strict=True)
 
 
+def _no_setting(name: str, known: Iterable[str]) -> PydanticCustomError:
+    near = get_close_matches(name, known) or sorted(known)
+    return PydanticCustomError(
+        "no_setting", "There is no such setting; there is {known}.", {"known": ", ".join(near)}
+    )
+
+
 def _merge(target: Mapping[str, Any], patch: Mapping[str, Any], path: tuple[str, ...]) -> dict[str, Any]:
     merged = dict(target)
     for name, value in patch.items():
         if name not in target:
-            unknown = InitErrorDetails(type="extra_forbidden", loc=(*path, name), input=value)
+            unknown = InitErrorDetails(type=_no_setting(name, target), loc=(*path, name), input=value)
             raise ValidationError.from_exception_data("Settings", [unknown])
         if value is None:
             del merged[name]

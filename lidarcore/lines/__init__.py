@@ -15,6 +15,7 @@ from lidarcore.lines import arras_siegwart, cwlf, ml, tls
 from lidarcore.lines.covariance import Free, covariances
 from lidarcore.lines.line import Line, Lines, normal_angle
 from lidarcore.lines.regression import (
+    BEYOND,
     LINE_CONSISTENT,
     LINE_FIELDS,
     LINE_MAP,
@@ -51,7 +52,9 @@ STATUS_MESSAGES = {
     THROUGH_SENSOR: "the line passes through the sensor, or the points are too close together for this fitter",
     NOT_FINITE: "no finite line with positive covariance came out",
     NOT_CONVERGED: "the search for the likeliest line did not come to an end",
+    BEYOND: "the line is farther away than every point: they do not lie along a wall",
 }
+_BEYOND = 1.1  # times the range of the farthest point, to which noise may move a line
 
 
 @inlined
@@ -79,6 +82,8 @@ def fit_piece(
         return NOT_FINITE
     if status != OK:
         return status
+    if normal[2] > _BEYOND * rho.max():
+        return BEYOND
     consistent, for_maps = covariances(work, rho, c, s, noise, normal, fitter == ML, free)
     return store(out, normal, published, consistent, for_maps)
 

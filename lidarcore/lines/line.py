@@ -59,6 +59,9 @@ class Lines:
     def __len__(self) -> int:
         return len(self.alpha)
 
+    def __repr__(self) -> str:
+        return f"<{len(self)} lines>"
+
     def __getitem__(self, i: int) -> Line:
         return Line(
             float(self.alpha[i]),

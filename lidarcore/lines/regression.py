@@ -10,7 +10,7 @@ from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
 
 # What a fit reports.
-OK, NO_DIRECTION, THROUGH_SENSOR, NOT_FINITE, NOT_CONVERGED = range(5)
+OK, NO_DIRECTION, THROUGH_SENSOR, NOT_FINITE, NOT_CONVERGED, BEYOND = range(6)
 
 # A line as kernels write it: unit normal (2), r, and covariances of (alpha, r), four numbers each.
 NORMAL, DISTANCE, LINE_PUBLISHED, LINE_CONSISTENT, LINE_MAP = 0, 2, 3, 7, 11

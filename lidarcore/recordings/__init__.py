@@ -74,9 +74,12 @@ def open_recording(
             recording.mask = tuple(mask)
         return recording
     if path.is_dir():
-        raise RecordingError(f"The directory {path.name} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
+        raise RecordingError(f"The directory {path} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
     known = ", ".join(format_.name for format_ in FORMATS)
-    raise RecordingError(f"{path.name} is in none of the known formats: {known}.")
+    raise RecordingError(
+        f"{path.name} is in none of the known formats: {known}. Anything else can be saved "
+        "with numpy.savez as a .npz: ranges (N, B) m and bearings (B,) rad."
+    )
 
 
 def _head(path: Path) -> bytes:

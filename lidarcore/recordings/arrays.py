@@ -20,13 +20,17 @@ NAMES = {
     "quality": ("quality", "intensities"),
     "beam_times": ("beam_times",),
     "odometry": ("odometry",),
+    "truth": ("truth",),
 }
 """What an array may be called, in any case of letters."""
 
 EXPECTED = (
     "expected are ranges (N, B) or (B,) m and bearings or angles (B,) or (N, B) rad counter-clockwise, "
-    "and, if known, stamps (N,) s, quality (N, B), beam_times (B,) or (N, B) s, odometry (N, 3) m, m, rad"
+    "and, if known, stamps (N,) s, quality (N, B), beam_times (B,) or (N, B) s, odometry (N, 3) m, m, rad, "
+    "and truth (N, 3) alike where poses are known"
 )
+
+_POSES = ("odometry", "truth")
 
 FARTHEST = 100.0
 """m: a median range beyond this is in another unit."""
@@ -50,21 +54,23 @@ class ArrayRecording(Recording):
         meaning = {alias: name for name, aliases in NAMES.items() for alias in aliases}
         loaded = self._load(lambda name: name.lower() in meaning)
         for name, array in loaded.items():  # that numbers are complex shows only now
-            self._check_size(name, array.shape, array.dtype.kind in "fiu")
+            self._check_size(name, array.shape, array.dtype.kind in "fiu", array.dtype.itemsize)
         arrays: dict[str, NDArray[Any]] = {meaning[name.lower()]: array for name, array in loaded.items()}
-        if not {"ranges", "bearings"} <= arrays.keys():
-            raise self._error(f"holds {' and '.join(arrays) or 'nothing'} of use: {EXPECTED}.")
+        if missing := [name for name in ("ranges", "bearings") if name not in arrays]:
+            raise self._error(f"has no {' and no '.join(missing)}: {EXPECTED}.")
         ranges = np.atleast_2d(arrays.pop("ranges"))
+        if ranges.ndim != 2:
+            raise self._error(f"has ranges of shape {ranges.shape}: {EXPECTED}.")
         self._check_beams(ranges.shape[-1])
         self._columns = {name: self._shaped(name, array, *ranges.shape) for name, array in arrays.items()}
         self._columns["ranges"] = ranges
         self._check()
 
-    def _check_size(self, name: str, shape: tuple[int, ...], real: bool) -> None:
+    def _check_size(self, name: str, shape: tuple[int, ...], real: bool, itemsize: int) -> None:
         """Raise RecordingError if an array is not of real numbers, or claims more than the file can hold."""
         if not real:
             raise self._error(f"has a {name} that is not of real numbers: {EXPECTED}.")
-        if prod(shape) > self._most_bytes():
+        if prod(shape) * itemsize > self._most_bytes():
             raise self._error(
                 f"has a {name} that claims the shape {shape}, too large for the size of the file."
             )
@@ -77,9 +83,9 @@ class ArrayRecording(Recording):
         """An array with one row for each scan."""
         if name == "stamps" and array.size == scans:
             return array.reshape(scans)
-        if name == "odometry" and array.size == 3 * scans:
+        if name in _POSES and array.size == 3 * scans:
             return array.reshape(scans, 3)
-        if name not in ("stamps", "odometry"):
+        if name not in ("stamps", *_POSES):
             if array.shape == (scans, beams):
                 return array
             if array.size == beams:

@@ -71,6 +71,10 @@ class Recording(ABC):
     def _scans(self) -> Iterator[Callable[[], Scan]]:
         """Yield what makes each scan: one that turns out damaged is then counted and left out."""
 
+    def __repr__(self) -> str:
+        topic = f", topic {self.topic}" if self.topic else ""
+        return f"<{self.name} {self.path}{topic}>"
+
     @property
     def stations(self) -> tuple[int, ...]:
         """Scans from which on the sensor stood elsewhere."""

@@ -5,13 +5,14 @@ Format: readlog.c and writelog.c of CARMEN's logger.
 
 import re
 from array import array
+from dataclasses import replace
 
 import numpy as np
 
 from lidarcore.geometry import PoseTrack, compose
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
 from lidarcore.recordings.laser_survey import SICK_RANGE, Survey
-from lidarcore.scan import Array
+from lidarcore.scan import Array, Scan
 
 _NEW = re.compile(r"(ROBOT|RAW)LASER\d")
 _FRONT, _REAR = ("robot_frontlaser_offset", 0.0), ("robot_rearlaser_offset", np.pi)
@@ -22,7 +23,10 @@ OFFSETS = {"FLASER": _FRONT, "RLASER": _REAR} | {
 
 
 class CarmenLog(LaserLog):
-    """A CARMEN log. T_odom_sensor is what the log says: wheel odometry, or poses somebody corrected."""
+    """A CARMEN log. T_odom_sensor is what the log says: wheel odometry, or poses somebody corrected.
+
+    Poses that the log declares corrected, as NEFF lines do, are the truth of its scans, too.
+    """
 
     name = "CARMEN log"
     signature = re.compile(
@@ -34,6 +38,7 @@ class CarmenLog(LaserLog):
         self._parameters: dict[str, str] = {}
         self._wheel_poses = array("d")
         self._track: PoseTrack | None = None
+        self._corrected = False
         super()._open(topic)
 
     def _distinct(self, topics: set[str]) -> set[str]:
@@ -68,6 +73,10 @@ class CarmenLog(LaserLog):
             return base_pose
         return compose(base_pose, self.T_base_sensor)
 
+    def _scan(self, reading: Reading, stamp: float) -> Scan:
+        scan = super()._scan(reading, stamp)
+        return replace(scan, truth=scan.odometry) if self._corrected else scan
+
     def _parse(self, words: list[bytes]) -> Reading | None:
         kind = words[0].decode("ascii", "replace") if words else ""
         if kind in ("FLASER", "RLASER"):
@@ -79,6 +88,7 @@ class CarmenLog(LaserLog):
         elif kind == "PARAM" and words[1].decode(errors="replace") in (_FRONT[0], _REAR[0]):
             self._parameters[words[1].decode(errors="replace")] = words[2].decode(errors="replace")
         elif kind == "NEFF":
+            self._corrected = True
             self._remark("GMapping wrote the log (NEFF lines): its poses are corrected, not wheel odometry.")
         return None
 

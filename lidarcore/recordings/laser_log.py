@@ -2,9 +2,9 @@
 
 from abc import abstractmethod
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -58,6 +58,9 @@ class LaserLog(Recording):
     Opening reads the file once: for the lidars in it, the marker for no return and the quality of the stamps.
     """
 
+    implied: ClassVar[Set[int]] = SICK_STEPS.keys()
+    """Numbers of beams whose bearings the format implies; of others, the sensor may be another one."""
+
     @abstractmethod
     def _parse(self, words: list[bytes]) -> Reading | None:
         """Read a line; None if it is not a laser's. Raises ValueError or IndexError if it is damaged."""
@@ -80,8 +83,10 @@ class LaserLog(Recording):
 
     def _learn(self, survey: Survey) -> None:
         """Learn from all readings of the chosen lidar what a single one does not say."""
-        if unknown := survey.beams - SICK_STEPS.keys():
-            self._remark(f"The log gives no angles: {max(unknown)} beams are taken to span 180 degrees.")
+        if unknown := survey.beams - self.implied:
+            beams = max(unknown)
+            span = np.degrees(np.ptp(sick_bearings(beams)))
+            self._remark(f"The log gives no angles: {beams} beams are taken to span {span:.4g} degrees.")
         self._marker = self._find_marker(survey)
         self._stamps = self._settle_stamps(survey.stamps())
 

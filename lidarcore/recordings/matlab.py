@@ -54,7 +54,7 @@ class MatlabFile(ArrayRecording):
             matrix = _describe(beginning, order) if kind in (MATRIX, COMPRESSED) else None
             if matrix is None or not wanted(matrix.name):
                 continue
-            self._check_size(matrix.name, matrix.shape, matrix.real)
+            self._check_size(matrix.name, matrix.shape, matrix.real, 1)  # each number takes a byte or more
             if kind == COMPRESSED:
                 unpacked = zlib.decompressobj().decompress(packed, self._most_bytes() + BEGINNING)
                 packed, size = memoryview(unpacked)[8:], size + len(unpacked)

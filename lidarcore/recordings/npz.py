@@ -53,7 +53,7 @@ class NpzArchive(ArrayRecording):
             data = gathered(member, size)
         if dtype.hasobject:
             raise self._error(f"holds pickled objects ({info.filename}), which can run code: not read.")
-        self._check_size(info.filename, shape, dtype.kind in "fiu")
+        self._check_size(info.filename, shape, dtype.kind in "fiu", dtype.itemsize)
         if len(data) < size:
             raise EOFError(f"{info.filename} is cut short")
         if prod(shape) * dtype.itemsize != size:

@@ -9,9 +9,13 @@ from lidarcore.recordings.laser_survey import SICK_RANGE
 
 
 class ScanTable(LaserLog):
-    """CSV with a header ...,r0,r1,... in m; t, max_range, odom_ and corr_ with x, y, theta are used if there."""
+    """CSV with a header ...,r0,r1,... in m; used if there are t, max_range, odom_ and corr_ with x, y, theta, and
+
+    angle_min with angle_increment, rad. Without these two the ranges are taken for those of a SICK, from the right.
+    """
 
     name = "CSV table of scans"
+    implied = frozenset()
     signature = re.compile(rb"\A(\w+,)+r0,r1,[r\d,]+\r?\n")
 
     def _open(self, topic: str | None) -> None:
@@ -26,6 +30,8 @@ class ScanTable(LaserLog):
         values = numbers(cells, len(self._columns))
         named = dict(zip(self._columns, values, strict=True))
         ranges = values[self._columns.index(b"r0") :]
+        first, step = (named.get(b"angle_" + name) for name in (b"min", b"increment"))
+        bearings = None if first is None or step is None else first + step * np.arange(len(ranges))
         odometry, corrected = (
             np.array([named.get(kind + name, np.nan) for name in (b"_x", b"_y", b"_theta")])
             for kind in (b"odom", b"corr")
@@ -33,7 +39,7 @@ class ScanTable(LaserLog):
         return Reading(
             "ranges",
             ranges,
-            None,
+            bearings,
             float(named.get(b"max_range", SICK_RANGE)),
             (float(named.get(b"t", 0.0)),),
             pose=odometry if np.isfinite(odometry).all() else None,

@@ -373,7 +373,9 @@ def test_a_file_that_is_locked_can_be_read_and_says_why_it_cannot_be_written(map
 def test_without_a_map_it_says_how_to_get_one(server: Server) -> None:
     assert server.get("/sessions")["sessions"] == []
     for path in ("/landmarks", "/landmarks/nearest?x=0&y=0", "/map"):
-        assert "slam" in assert_problem(server.http.get(path), 404)["detail"]
+        said = assert_problem(server.http.get(path), 404)["detail"]
+        assert "navigation.method to landmarks" in said
+        assert "/map/grid" in said
 
 
 def test_the_map_of_a_run_is_there_within_a_second_and_cannot_be_deleted_under_it(

@@ -125,6 +125,12 @@ def test_what_is_no_json_object_of_finite_numbers_is_refused(
     assert shared_server.get("/settings") == json.loads(AT_START.model_dump_json())
 
 
+def test_where_no_json_is_sent_the_answer_asks_for_some(shared_server: Server) -> None:
+    for request in ({}, {"content": "gap=1", "headers": {"content-type": "text/plain"}}):
+        problem = assert_problem(shared_server.http.patch("/settings", **request), 422)
+        assert problem["detail"].startswith("Send a JSON body")
+
+
 def test_the_schema_describes_every_number_with_range_and_meaning(server: Server) -> None:
     schema = server.get("/settings/schema")
 

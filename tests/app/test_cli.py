@@ -17,7 +17,9 @@ from lidarcore_app.web.serving import listen
 from processes import Serving, assert_refused, run
 from serving import ROOT, write_room
 
+import lidarcore
 from lidarcore import ExtractionSettings, compare, open_recording
+from lidarcore.mapping.grid import build_grid, write_ros_map
 
 
 def test_help_is_instant_and_names_every_command() -> None:
@@ -40,6 +42,7 @@ def test_info_says_what_is_in_a_recording(hokuyo: Path) -> None:
         r"topic +/scan",
         f"scans +{len(scans)}",
         "beams per scan +681 to 681",
+        r"bearings +-\d+\.\d to \d+\.\d degrees",
         "duration +35.8 s",
     ):
         assert re.search(line, result.stdout), (line, result.stdout)
@@ -232,5 +235,73 @@ def test_a_recording_is_not_overwritten_with_its_own_result(tmp_path: Path) -> N
 
 def test_a_missing_folder_is_named(tmp_path: Path) -> None:
     room = write_room(tmp_path / "room.npz")
-    assert_refused(run("process", room, "-o", tmp_path / "none" / "room.csv"), "no folder", "none")
+    assert_refused(run("process", room, "-o", tmp_path / "none" / "room.csv"), "a folder that exists", "none")
     assert_refused(run("serve", "--port", "0", "--recordings", room), "is not a folder")
+
+
+def test_the_version_is_told() -> None:
+    assert run("--version").stdout == f"lidarcore {lidarcore.__version__}\n"
+    assert run("-h").stdout == run("--help").stdout
+
+
+@pytest.mark.parametrize(
+    ("assignment", "words"),
+    [
+        ("gapp=1", "extraction.gapp: There is no such setting; there is gap."),
+        ("foo=1", "There is no such setting; there is corner_angle, corner_gap, "),
+        ("view.layer.grid=true", "view.layer: There is no such setting; there is layers."),
+    ],
+)
+def test_an_unknown_setting_is_told_with_those_there_are(assignment: str, words: str, tmp_path: Path) -> None:
+    room = write_room(tmp_path / "room.npz", scans=1)
+    assert_refused(run("process", room, "-o", tmp_path / "out.csv", "--set", assignment), words)
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("calibrate", "cannot be written there"),
+        ("process", "cannot be written there"),
+        ("localize", "cannot be written there"),
+        ("map", "cannot be a folder, since"),
+    ],
+)
+def test_what_cannot_be_written_is_told_before_the_work(command: str, words: str, tmp_path: Path) -> None:
+    """The recording is not even opened."""
+    (tmp_path / "file").touch()
+    outputs = {"map": tmp_path / "file", "calibrate": Path("/proc/x.json")}
+    output = outputs.get(command, Path("/proc/x.csv"))
+    assert_refused(run(command, "no-recording.npz", "-o", output), words)
+
+
+def test_a_calibration_across_stations_says_how_to_choose_one(tmp_path: Path) -> None:
+    rows = [
+        f"{station},{revolution},{angle},{2000 + 500 * station}"
+        for station in (0, 1)
+        for revolution in range(3)
+        for angle in range(0, 360, 2)
+    ]
+    path = tmp_path / "stations.csv"
+    path.write_text("\n".join(["station,rev,angle_deg,distance_mm", *rows]) + "\n")
+    assert_refused(
+        run("calibrate", path), "From scan 3 on", "--skip and --scans", "lidarcore evaluate stations"
+    )
+
+
+def test_one_is_not_many(tmp_path: Path) -> None:
+    room = write_room(tmp_path / "room.npz", scans=1)
+    assert run("process", room, "-o", tmp_path / "out.csv").stdout.endswith(" of 1 scan\n")
+
+
+def test_localizing_where_nothing_fits_says_why(tmp_path: Path) -> None:
+    """The map is given as a folder, as `lidarcore map` writes one."""
+    room = write_room(tmp_path / "room.npz", scans=1)
+    (tmp_path / "map").mkdir()
+    grid = build_grid(list(open_recording(room)), np.zeros((1, 3)))
+    write_ros_map(grid, tmp_path / "map" / "map.yaml")
+    bearings = np.linspace(-np.pi, np.pi, 360, endpoint=False)
+    np.savez(tmp_path / "round.npz", ranges=np.full((5, 360), 9.0), bearings=bearings)
+    result = run("localize", tmp_path / "round.npz", "--map", tmp_path / "map")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith("No pose was found. ")
+    assert result.stdout.endswith("5 scans, 0 of them tracked.\n")

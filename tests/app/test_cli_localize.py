@@ -76,7 +76,9 @@ def test_a_map_of_whole_scans_has_the_poses_of_all_scans(
     ("arguments", "words"),
     [
         (("--map", "nowhere.json"), "nowhere.json"),
-        (("--save-map", "map.txt"), "should end in one of"),
+        (("--save-map", "map.txt"), "should end in one of .json, .csv, .geojson."),
+        (("--map", "map.txt"), "should end in one of .json, .csv, .geojson, .yaml, .yml."),
+        (("--map", "."), "map.yaml"),
     ],
 )
 def test_what_cannot_be_is_said_in_a_sentence(

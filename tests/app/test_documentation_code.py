@@ -4,6 +4,7 @@ import contextlib
 import re
 import runpy
 import shlex
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -93,6 +94,14 @@ def test_an_example_runs(
     monkeypatch.setattr(sys, "argv", [path.name, *([running.url] if path.name == "09_rest.py" else [])])
     runpy.run_path(str(path), run_name="__main__")
     assert capsys.readouterr().out.strip()
+
+
+def test_the_example_that_needs_a_server_says_so_in_a_line() -> None:
+    command = [sys.executable, str(ROOT / "examples" / "09_rest.py"), "http://127.0.0.1:9"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith("No server answers at http://127.0.0.1:9")
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_every_example_is_listed() -> None:

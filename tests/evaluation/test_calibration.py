@@ -269,7 +269,13 @@ def test_the_command_writes_a_noise_that_extraction_takes(data, tmp_path):
     arguments = ["calibrate", str(recording), "--skip", "5", "--scans", "100", "-o", str(profile)]
     result = CliRunner().invoke(cli, arguments, env={"COLUMNS": "120"})
     assert result.exit_code == 0, result.output
-    for row in ("sigma_bearing, mrad", "sigma_range, mm", "range bias, mm", "alignment, °"):
+    for row in (
+        "sigma_bearing, mrad",
+        "sigma_range, mm",
+        "unevenness_length, mm",
+        "resampling",
+        "alignment, °",
+    ):
         assert row in result.output
     assert "sensor's x axis" in result.output.replace("\n", " ")
     scans = list(islice(open_recording(recording), 5, 105))
@@ -402,10 +408,17 @@ def test_words_say_where_one_number_fits_badly():
     said = remarks(scans)
     assert "Range noise" not in said
     assert "drifted" not in said
-    grows = remarks(rougher(scans, lambda ranges: 0.005 * ranges))
+    growing = calibrate(rougher(scans, lambda ranges: 0.001 * ranges**2))
+    assert growing.by_range.p_value < 0.01
+    assert not any("Range noise" in remark for remark in report(growing).remarks)  # the growth explains it
+    sigma_range, growth, sigma_bearing = growing.on_smooth_walls
+    constant = replace(growing, on_smooth_walls=(sigma_range, Interval(0, 0, growth.high), sigma_bearing))
+    grows = " ".join(report(constant).remarks)
     assert (
         "grows with distance: one number fits badly; ellipses of corners far away will be too small" in grows
     )
+    beyond = remarks(rougher(scans, lambda ranges: 0.0001 * np.exp(ranges)))
+    assert "differs with distance: sigma_range and range_growth fit badly" in beyond
     falls = remarks(rougher(scans, lambda ranges: 0.02 / ranges))
     assert "falls with distance: one number fits badly; ellipses of corners nearby will be too small" in falls
 

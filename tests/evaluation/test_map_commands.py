@@ -18,7 +18,7 @@ EVERY = 4  # scans
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Forty seconds in the furnished room, saved with the true poses in place of odometry."""
+    """Forty seconds in the furnished room, saved with the true poses, also in place of odometry."""
     scans = list(islice(SimulatedRobot(SimulationSettings(world="furnished room", seed=3)), 0, 400, EVERY))
     path = tmp_path_factory.mktemp("drive") / "drive.npz"
     np.savez(
@@ -27,6 +27,7 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
         bearings=scans[0].bearings,
         stamps=np.array([scan.stamp for scan in scans]),
         odometry=np.array([scan.truth for scan in scans]),
+        truth=np.array([scan.truth for scan in scans]),
     )
     return path
 
@@ -71,7 +72,48 @@ def test_poses_are_found_where_the_robot_came_by_before_and_none_elsewhere_is_be
         assert found_outside == wrong == "0"
 
 
-def test_what_is_no_deviation_of_the_reference_is_refused(drive: Path) -> None:
-    result = CliRunner().invoke(cli, ["evaluate", "map", str(drive), "--own", "0.02"])
-    assert result.exit_code != 0
+def test_raw_odometry_is_no_reference(drive: Path, tmp_path: Path) -> None:
+    with np.load(drive) as file:
+        arrays = {name: file[name] for name in file}
+    assert "reference                  the corrected poses that the log has for odometry" in said(
+        "map", drive
+    )
+    arrays["truth"][:, 2] = np.nan
+    np.savez(tmp_path / "positions.npz", **arrays)
+    told = said("map", tmp_path / "positions.npz")
+    assert re.search("reference +none.* no headings", told)
+    del arrays["truth"]
+    np.savez(tmp_path / "raw.npz", **arrays)
+    told = said("map", tmp_path / "raw.npz")
+    assert re.search("reference +none.* no reference poses", told)
+    assert "wrong" not in told
+    assert "relative poses" not in told
+
+
+@pytest.mark.parametrize("own", ["0.02", "nan,nan", "-1,-1", "0.02,inf", "a,b"])
+def test_what_is_no_deviation_of_the_reference_is_refused(drive: Path, own: str) -> None:
+    result = CliRunner().invoke(cli, ["evaluate", "map", str(drive), "--own", own])
+    assert result.exit_code == 2
     assert "two numbers" in result.output
+
+
+def test_settings_are_not_taken_for_simulated_rooms_that_do_not_use_them() -> None:
+    result = CliRunner().invoke(cli, ["evaluate", "walls", "--seeds", "1", "--set", "gap=0.3"])
+    assert result.exit_code == 2
+    assert "name one, or leave them out" in " ".join(result.output.replace("│", " ").split())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("evaluate", "repeatability", "x", "--scans"),
+        ("evaluate", "repeatability", "x", "--skip"),
+        ("calibrate", "x", "--scans"),
+        ("evaluate", "consistency", "--trials"),
+        ("evaluate", "map", "x", "--seeds"),
+    ],
+)
+def test_counts_that_no_recording_has_are_refused(words: tuple[str, ...]) -> None:
+    result = CliRunner().invoke(cli, [*words, "99999999999999999999999"])
+    assert result.exit_code == 2
+    assert "less than or equal" in result.output

@@ -136,3 +136,14 @@ def assert_sound_or_refused(name, ranges, bearings, noise):
     assert_positive_definite(line.covariance_published)
     assert_positive_definite(line.covariance_consistent)
     return line
+
+
+@pytest.mark.parametrize("name", FITTERS)
+def test_points_around_the_sensor_make_no_wall_farther_away_than_all_of_them(name):
+    rng = np.random.default_rng(0)
+    bearings = np.linspace(-np.pi, np.pi, 200, endpoint=False)
+    try:
+        line = FITTERS[name].fit(1 + rng.normal(0, 0.01, 200), bearings, SensorNoise(0.01, 0.001))
+    except DegenerateLineError:
+        return
+    assert line.r < 1.1

@@ -52,7 +52,7 @@ def test_all_columns_arrive(saved):
     poses = np.array([[0, 0, 0], [1, 2, 0.1], [2, 3, 0.2]])
     path = saved(
         ranges=RANGES, bearings=BEARINGS, stamps=np.array([5.0, 5.5, 6.0]), quality=RANGES * 2,
-        beam_times=BEARINGS + 2, odometry=poses, comment=np.arange(3),
+        beam_times=BEARINGS + 2, odometry=poses, truth=poses + 1, comment=np.arange(3),
     )  # fmt: skip
     for index, scan in enumerate(open_recording(path)):
         np.testing.assert_array_equal(scan.ranges, RANGES[index])
@@ -60,6 +60,7 @@ def test_all_columns_arrive(saved):
         np.testing.assert_array_equal(scan.quality, RANGES[index] * 2)
         np.testing.assert_array_equal(scan.beam_times, BEARINGS + 2)
         np.testing.assert_array_equal(scan.odometry, poses[index])
+        np.testing.assert_array_equal(scan.truth, poses[index] + 1)
         assert scan.stamp == [5.0, 5.5, 6.0][index]
 
 
@@ -84,7 +85,9 @@ def test_markers_for_no_return_are_missing(saved):
 @pytest.mark.parametrize(
     ("arrays", "text"),
     [
-        ({"distances": RANGES, "bearings": BEARINGS}, "holds bearings of use: expected are ranges"),
+        ({"distances": RANGES, "bearings": BEARINGS}, "has no ranges: expected are ranges"),
+        ({"ranges": RANGES}, "has no bearings: expected are ranges"),
+        ({"ranges": RANGES[None], "bearings": BEARINGS}, r"ranges of shape \(1, 3, 5\): expected are ranges"),
         ({"ranges": RANGES.T, "bearings": BEARINGS}, r"bearings of shape .*5.* and ranges of \(5, 3\)"),
         ({"ranges": RANGES, "bearings": np.linspace(0, 359, 5)}, "from 0 to 359: expected are radians"),
         ({"ranges": RANGES * 1000, "bearings": BEARINGS}, "median range of 8000: expected are metres"),

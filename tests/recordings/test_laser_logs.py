@@ -228,3 +228,29 @@ def test_the_marker_of_a_table_of_scans_is_missing(data):
     )
     path = sum(math.dist(a.odometry[:2], b.odometry[:2]) for a, b in pairwise(scans))
     assert path == pytest.approx(76.4, abs=0.2)
+
+
+def table(path, names, *, beams=360):
+    """A CSV table of two scans, with columns of these names besides."""
+    header = ",".join(["t", *names, *(f"r{k}" for k in range(beams))])
+    rows = (",".join(map(str, [t, *names.values(), *[2.0] * beams])) for t in (0.0, 0.1))
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return open_recording(path)
+
+
+def test_a_table_without_angles_says_what_it_is_taken_for(tmp_path):
+    recording = table(tmp_path / "bare.csv", {})
+    assert "The log gives no angles: 360 beams are taken to span 179.5 degrees." in recording.notes
+    assert np.ptp(next(iter(recording)).bearings) == pytest.approx(math.radians(179.5))
+
+
+def test_a_table_may_give_its_angles(tmp_path):
+    step = math.tau / 360
+    recording = table(tmp_path / "turn.csv", {"angle_min": -math.pi, "angle_increment": step})
+    assert not any("angles" in note for note in recording.notes)
+    np.testing.assert_allclose(next(iter(recording)).bearings, -math.pi + step * np.arange(360))
+
+
+def test_poses_that_a_log_declares_corrected_are_its_truth(data):
+    corrected = next(iter(open_recording(data / CARMEN / "intel-corrected.log.gz")))
+    np.testing.assert_array_equal(corrected.truth, corrected.odometry)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Seed, Workers, check_folder
+from ..options import MOST, Seed, Workers, check_folder
 from ..progress import ForPrograms, counted
 
 if TYPE_CHECKING:
@@ -17,7 +17,10 @@ WIDTH = 150  # of the tables in a file or a pipe
 
 def calibration(
     rooms: Annotated[
-        int, typer.Option(min=1, help="simulated rooms, shared out among sizes and lengths of unevenness")
+        int,
+        typer.Option(
+            min=1, max=MOST, help="simulated rooms, shared out among sizes and lengths of unevenness"
+        ),
     ] = 200,
     noise: Annotated[
         str | None,
@@ -26,11 +29,13 @@ def calibration(
             help="noise of the sensor in m, rad and 1/m; 0.002,0.001,0.0003 if not given",
         ),
     ] = None,
-    scans: Annotated[int, typer.Option(min=10, help="scans of a calibration")] = 60,
+    scans: Annotated[int, typer.Option(min=10, max=MOST, help="scans of a calibration")] = 60,
     fewer: Annotated[
         int,
         typer.Option(
-            min=10, help="scans of a second calibration, at most --scans; its errors are printed, too"
+            min=10,
+            max=MOST,
+            help="scans of a second calibration, at most --scans; its errors are printed, too",
         ),
     ] = 40,
     seed: Seed = 0,

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import RecordingPath, Seed, Set, SettingsFile, Topic, Workers, check_folder, settings_from
+from ..options import (
+    MOST,
+    RecordingPath,
+    Seed,
+    Set,
+    SettingsFile,
+    Topic,
+    Workers,
+    check_folder,
+    settings_from,
+)
 from ..progress import ForPrograms, progress
 from .agreement import agreement
 from .calibration import calibration
@@ -56,6 +66,7 @@ Trials = Annotated[
     int,
     typer.Option(
         min=1,
+        max=MOST,
         help="corner trials in all, each by every method; "
         "rounded up to whole blocks for each room, noise and segmentation",
     ),
@@ -76,7 +87,7 @@ def consistency(
     noise: Noises = None,
     segments: Segments = "both",
     trials: Trials = 100_000,
-    beams: Annotated[int, typer.Option(min=90, help="beams in a revolution")] = 920,
+    beams: Annotated[int, typer.Option(min=90, max=100_000, help="beams in a revolution")] = 920,
     seed: Seed = 0,
     workers: Workers = None,
     scheduler: Scheduler = None,
@@ -138,8 +149,8 @@ def _console() -> "Console":
 @evaluate.command()
 def repeatability(
     recording: RecordingPath,
-    scans: Annotated[int, typer.Option(min=10, help="scans to read and judge together")] = 100,
-    skip: Annotated[int, typer.Option(min=0, help="scans to skip at the beginning")] = 0,
+    scans: Annotated[int, typer.Option(min=10, max=MOST, help="scans to read and judge together")] = 100,
+    skip: Annotated[int, typer.Option(min=0, max=MOST, help="scans to skip at the beginning")] = 0,
     methods: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="fitters to compare; all if not given")
     ] = None,
@@ -157,7 +168,7 @@ def repeatability(
     from lidarcore.evaluation.repeatability import tables as repeatability_tables
     from lidarcore.evaluation.repeatability.statistics import Repeatability
 
-    from .repeatability_table import tables
+    from .repeatability_table import remarks, tables
 
     if output is not None:
         consistency_tables.check(output)
@@ -172,9 +183,8 @@ def repeatability(
     console = _console()
     for shown in tables(summary):
         console.print(shown)
-    for message in dict.fromkeys((summary.message, summary.walls.message)):
-        if message is not None:
-            console.print(message)
+    for remark in remarks(summary):
+        console.print(remark)
     if output is not None:
         repeatability_tables.write(summary, output)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Seed, Workers, check_folder
+from ..options import Seed, Workers, check_folder, plural
 from ..progress import counted
 
 if TYPE_CHECKING:
@@ -58,8 +58,8 @@ def honesty(
         console = Console(width=_WIDTH)
     for one in found:
         console.print(
-            f"{one.world}, {_ODOMETRY[one.odometry]}: {one.runs} runs, {one.lost} of them lost; {one.loops} loops, "
-            f"{one.wrong} of them wrong"
+            f"{one.world}, {_ODOMETRY[one.odometry]}: {plural(one.runs, 'run')}, {one.lost} of them lost; "
+            f"{plural(one.loops, 'loop')}, {one.wrong} of them wrong"
         )
         console.print(_table(one))
     console.print(

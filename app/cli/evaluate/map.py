@@ -1,12 +1,12 @@
 """The command `lidarcore evaluate map`."""
 
-from math import degrees
+from math import degrees, inf, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, counting, settings_from
 
 if TYPE_CHECKING:
     from lidarcore import Array
@@ -23,9 +23,12 @@ def evaluate_map(
             help="recorded, poor (3 % scale, 1 % a metre turn bias, noise), none; auto is what the recording allows"
         ),
     ] = "auto",
-    seed: Annotated[int, typer.Option(min=0, help="seed of the errors of poor odometry")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=MOST, help="seed of the errors of poor odometry")] = 0,
     seeds: Annotated[
-        int, typer.Option(min=1, help="runs with poor odometry, each with a seed of its own, from --seed on")
+        int,
+        typer.Option(
+            min=1, max=MOST, help="runs with poor odometry, each with a seed of its own, from --seed on"
+        ),
     ] = 1,
     relations: Annotated[
         Path | None,
@@ -40,15 +43,16 @@ def evaluate_map(
 ) -> None:
     """How far a map of a recording is from reference poses: relative poses, covariances, loops, time."""
     from lidarcore import open_recording
-    from lidarcore.evaluation.maps.accuracy import read_relations
+    from lidarcore.evaluation.maps.accuracy import name_of_reference, read_relations
     from lidarcore.evaluation.maps.study import prepared, study
 
     from ..map_run import mapper_settings
 
     chosen = settings_from(settings, set_)
+    sigmas = _sigmas(own)
     verified = None if relations is None else read_relations(relations)
     scans = list(open_recording(recording, topic, chosen.sensor.mask))
-    sigmas = _sigmas(own)
+    typer.echo(f"{'reference':26} {name_of_reference(scans)}")
     for number in range(seed, seed + seeds):
         given, reference = prepared(scans, odometry, number)
         with counting("scans") as count:
@@ -111,5 +115,9 @@ def _sigmas(text: str) -> tuple[float, float]:
     try:
         distance, turn = map(float, text.split(","))
     except ValueError:
-        raise typer.BadParameter(f"--own {text!r} should be two numbers, m and rad: 0.02,0.005.") from None
+        distance = turn = nan
+    if not (0 <= distance < inf and 0 <= turn < inf):
+        raise typer.BadParameter(
+            f"--own {text!r} should be two numbers, m and rad, that are not negative: 0.02,0.005."
+        )
     return distance, turn

@@ -60,6 +60,11 @@ def walls(
 ) -> None:
     """How well walls and grid of a map agree, and whether walls are where their covariances say."""
     if recording is None:
+        if settings is not None or set_:
+            raise typer.BadParameter(
+                "--settings and --set are for a recording: name one, or leave them out. "
+                "Simulated rooms have settings of their own."
+            )
         _simulated(seeds)
         return
     from lidarcore import open_recording

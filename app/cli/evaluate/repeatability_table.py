@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence, Sized
 from rich.table import Table
 
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.evaluation.repeatability.summary import Box, Method, Summary
+from lidarcore.evaluation.repeatability.summary import Box, Claim, Method, Summary, has_other_tails
 
 from .consistency_table import COLOURS
 
@@ -20,6 +20,19 @@ def tables(summary: Summary) -> Iterator[Table]:
     yield _table(f"Walls, (alpha, r), in the last {summary.scans} scans", "walls", "mrad mm", walls)
 
 
+def remarks(summary: Summary) -> Iterator[str]:
+    """What is wrong, and what "neither" means where the tables have it."""
+    yield from filter(None, dict.fromkeys((summary.message, summary.walls.message)))
+    claims = (
+        claim for method in (*summary.methods, *summary.walls.methods) for claim in method.claims.values()
+    )
+    if any(has_other_tails(claim.judgement) for claim in claims):
+        yield (
+            "neither: ellipses of 50 % and of 95 % are wrong in opposite ways, so that no size makes both true. The "
+            "scatter has other tails than a Gaussian: see whether something moved; a calibration measures them."
+        )
+
+
 def _table(title: str, what: str, unit: str, methods: Sequence[tuple[Method, Sized]]) -> Table:
     result = Table(
         title=f"{title}: median one-sigma ellipse of a scan, and the scatter, {unit}", title_justify="left"
@@ -27,7 +40,7 @@ def _table(title: str, what: str, unit: str, methods: Sequence[tuple[Method, Siz
     for heading in ("fitter", "covariance"):
         result.add_column(heading, no_wrap=True)
     for heading in (
-        what, "claimed", "quartiles", "scatter", "claimed / scatter", "in 50 %", "in 95 %", "in 99 %",
+        what, "claimed", "quartiles", "scatter", "claimed / scatter, geometric mean", "in 50 %", "in 95 %", "in 99 %",
     ):  # fmt: skip
         result.add_column(heading, justify="right")
     result.add_column("ellipses are", no_wrap=True)
@@ -41,9 +54,16 @@ def _table(title: str, what: str, unit: str, methods: Sequence[tuple[Method, Siz
                 *_box(claim.areas),
                 "" if method.actual_area is None else f"{MICRO * method.actual_area:.2f}",
                 *map(_cell, (judged.area_ratio, judged.coverage_50, judged.coverage_95, judged.coverage_99)),
-                "" if claim.verdict is None else f"[{COLOURS[claim.verdict]}]{claim.verdict}[/]",
+                _verdict(claim),
             )
     return result
+
+
+def _verdict(claim: Claim) -> str:
+    if claim.verdict is None:
+        return ""
+    word = "neither" if has_other_tails(claim.judgement) else claim.verdict
+    return f"[{COLOURS[claim.verdict]}]{word}[/]"
 
 
 def _box(box: Box | None) -> tuple[str, str]:

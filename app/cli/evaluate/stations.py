@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Set, SettingsFile, check_folder, counting, settings_from
+from ..options import MOST, Set, SettingsFile, check_folder, counting, settings_from
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ WIDTH = 150  # of the tables in a file or a pipe
 def stations(
     recordings: Annotated[list[Path], typer.Argument(help="recordings of sensors that stood still")],
     methods: Annotated[str, typer.Option(metavar="NAME,...", help="fitters to judge")] = "ml,utls",
-    window: Annotated[int, typer.Option(min=10, help="scans that are judged together")] = 100,
+    window: Annotated[int, typer.Option(min=10, max=MOST, help="scans that are judged together")] = 100,
     given: Annotated[
         bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
     ] = False,

@@ -74,7 +74,10 @@ def chosen_map(landmarks: LandmarkStore, session: int | None) -> LandmarkMap:
     """The map asked for. Raises UnknownSessionError, or NotFoundError if there is none at all."""
     found = landmarks.map(session)
     if found is None:
-        raise NotFoundError("There is no map yet: set navigation.mode to slam, or load one.")
+        raise NotFoundError(
+            "There is no map of landmarks yet: set navigation.mode to slam and navigation.method to landmarks, or "
+            "load one. A map of whole scans is in /walls and /map/grid."
+        )
     return found
 
 

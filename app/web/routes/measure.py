@@ -1,9 +1,11 @@
 """Distances and angles between walls and corners, of a scan or of the map, with their standard deviations."""
 
+import re
 from typing import Annotated, Literal, NamedTuple, cast
 
 import numpy as np
 from fastapi import APIRouter, Query
+from pydantic import AfterValidator
 from typing_extensions import TypedDict
 
 from lidarcore import Array
@@ -30,10 +32,22 @@ NO_WALLS = (
 
 _Candidates = tuple[list[Feature], list[int], Array]  # each with its id, and its place (N, 2) m that is meant
 
+_PLACE = r"^(map-)?(corner|wall)@-?\d{1,6}(\.\d{1,12})?,-?\d{1,6}(\.\d{1,12})?$"
+
+
+def _place(text: str) -> str:
+    if not re.search(_PLACE, text):
+        raise ValueError(
+            f"{text!r} is no place: write corner@x,y, wall@x,y, map-corner@x,y or map-wall@x,y, x and y in metres"
+        )
+    return text
+
+
 Place = Annotated[
     str,
+    AfterValidator(_place),
     Query(
-        pattern=r"^(map-)?(corner|wall)@-?\d{1,6}(\.\d{1,12})?,-?\d{1,6}(\.\d{1,12})?$",
+        json_schema_extra={"pattern": _PLACE},
         description="corner@x,y or wall@x,y: the nearest of the scan to a place, m, in the frame of the map or of the "
         "sensor; map-corner@x,y or map-wall@x,y: of the map of whole scans",
         examples=["corner@3.1,1.99"],

@@ -34,14 +34,31 @@ def relative_errors(poses: Array, reference: Array, pairs: Ints) -> Array:
 def reference_poses(scans: list[Scan]) -> tuple[Array, bool]:
     """Poses (N, 3) to compare with, and whether they stand where the log has its odometry.
 
-    What a log or simulator gives as truth, else the poses in the log, which are then taken to be corrected ones.
-    Raises EvaluationError if there are neither.
+    They are what a recording declares to be true or corrected: raw odometry is no reference.
+    Raises EvaluationError if there are none, or their headings are not known.
     """
-    for name in ("truth", "odometry"):
-        poses = [getattr(scan, name) for scan in scans]
-        if all(pose is not None and np.isfinite(pose).all() for pose in poses):
-            return np.array(poses), name == "odometry"
-    raise EvaluationError("The recording has no reference poses: there is nothing to compare the map with.")
+    poses = [scan.truth for scan in scans if scan.truth is not None]
+    odometry = [scan.odometry for scan in scans if scan.odometry is not None]
+    reference = np.array(poses)
+    if not np.isfinite(reference).all():
+        raise EvaluationError(
+            "The recording knows positions but no headings: that is no reference to compare the map with."
+        )
+    if len(poses) < len(scans):
+        raise EvaluationError(
+            "The recording has no reference poses, true or corrected ones for all scans: there is nothing to "
+            "compare the map with."
+        )
+    return reference, len(odometry) == len(scans) and np.array_equal(np.array(odometry), reference)
+
+
+def name_of_reference(scans: list[Scan]) -> str:
+    """What `reference_poses` of these scans are, or why there are none."""
+    try:
+        _, stand_in = reference_poses(scans)
+    except EvaluationError as error:
+        return f"none. {error}"
+    return "the corrected poses that the log has for odometry" if stand_in else "the true or corrected poses"
 
 
 def with_poor_odometry(scans: list[Scan], reference: Array, seed: int) -> list[Scan]:

@@ -26,14 +26,27 @@ class Judgement:
 def verdict(judgement: Judgement) -> Verdict | None:
     """Wrong if the 95 % ellipses surely are, or those of 50 %; true if those of 95 % surely are near it; else open.
 
+    Open, too, if the two are wrong in opposite ways (`has_other_tails`).
+
     With few sightings only the 50 % ellipses can tell that ellipses are too large: those of 95 % miss 5 in 100 at best.
     None where nothing is known. A study's `consistency_verdicts.verdict` asks for more, as it has more trials.
     """
     held = judgement.coverage_95
     if held.value != held.value:
         return None
+    if has_other_tails(judgement):
+        return "open"
     found = wrong(held, HONEST) or wrong(judgement.coverage_50, HONEST_50)
     return found or ("true" if within(held, BELIEVED) else "open")
+
+
+def has_other_tails(judgement: Judgement) -> bool:
+    """Whether ellipses of 50 % are surely too large where those of 95 % are too small, or the other way around.
+
+    No size makes both true: the tails of what scatters are not those of a Gaussian.
+    """
+    inner, outer = wrong(judgement.coverage_50, HONEST_50), wrong(judgement.coverage_95, HONEST)
+    return inner is not None and outer is not None and inner != outer
 
 
 @dataclass(frozen=True, slots=True)
