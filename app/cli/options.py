@@ -39,11 +39,11 @@ def end_like_ctrl_c() -> None:
             signal.signal(number, signal.default_int_handler)
 
 
-def check_folder(file: Path, option: str = "--output") -> None:
+def check_folder(file: Path) -> None:
     """Told before minutes of work are lost. Raises FileNotFoundError unless there can be a file of that name."""
     if file.is_dir() or not file.absolute().parent.is_dir():
         raise FileNotFoundError(
-            errno.ENOENT, f"is not a file in a folder that exists; give one for {option}", str(file)
+            errno.ENOENT, "is not a file in a folder that exists; give one for --output", str(file)
         )
 
 

@@ -60,14 +60,14 @@ class _View:
     beams: Ints
 
 
-def measure_accuracy(sigma_range: float, scans: int, seed: int, fitter: str = "ml") -> Accuracy:
+def measure_accuracy(sigma_range: float, scans: int, seed: int) -> Accuracy:
     """Scans of the furnished room from random poses, against what can be seen in it.
 
     sigma_range in m; the bearing noise is 0.001 rad. Both are told to the extraction, all else is default.
     """
     rng, world, result = np.random.default_rng(seed), furnished_room(), Accuracy()
     sensor = SimulatedSensor(world, SensorNoise(sigma_range, 0.001))
-    settings = ExtractionSettings(fitter=fitter, noise=sensor.noise)
+    settings = ExtractionSettings(noise=sensor.noise)
     for _ in range(scans):
         pose = random_pose(world, rng)
         scan, hit = sensor.scan(pose, rng)

@@ -61,12 +61,6 @@ def ellipse_axes(covariance: Array, sigmas: float = 1.0) -> tuple[Array, Array]:
     return sigmas * np.sqrt(np.maximum(variances, 0.0)), directions
 
 
-def ellipse_area(covariance: Array, sigmas: float = 1.0) -> Array:
-    """Area (...,) m² of the ellipses of covariances (..., 2, 2) m² at this Mahalanobis distance."""
-    area: Array = np.pi * sigmas**2 * np.sqrt(np.maximum(np.linalg.det(covariance), 0.0))
-    return area
-
-
 def ellipse_outline(xy: Array, covariance: Array, sigmas: float, points: int) -> Array:
     """Closed outlines (..., points, 2) of ellipses of covariances (..., 2, 2) around xy (..., 2)."""
     half, directions = ellipse_axes(covariance, sigmas)

@@ -24,6 +24,7 @@ from lidarcore.scan import Array, Ints
 
 _FAR = 6.0  # standard deviations; what is known of a pose after a gap is rough
 _SIGMAS = 4.0
+_NEEDED = 4  # pairs at least
 _PAIRS = 12  # observed pairs to try, the longest ones: they fix the heading best
 _SAME = np.array([0.3, 0.3, 0.2])  # m, m, rad: poses nearer than this are one
 _ROUNDS = 4
@@ -42,18 +43,16 @@ class Relocation:
     pairs: Ints
 
 
-def relocalize(
-    observed: Points, landmarks: Points, min_pairs: int = 4, near: tuple[Array, Array] | None = None
-) -> Relocation:
-    """Find the one pose from which the landmarks of the map explain min_pairs of the points seen, and half of them.
+def relocalize(observed: Points, landmarks: Points, near: tuple[Array, Array] | None = None) -> Relocation:
+    """Find the one pose from which the landmarks of the map explain four of the points seen, and half of them.
 
     near, if given, are a pose (3,) and a covariance (3, 3): only poses within some of its standard deviations count.
     Raises LostError if there is none, or several explain as much: a symmetric room, or too few points; or if the map
     is too large to be searched.
     """
     found: list[Relocation] = []
-    _check(observed, landmarks, min_pairs)
-    min_pairs, refined = max(min_pairs, (len(observed) + 1) // 2), 0
+    _check(observed, landmarks, _NEEDED)
+    min_pairs, refined = max(_NEEDED, (len(observed) + 1) // 2), 0
     if min(len(observed), len(landmarks)) < min_pairs:
         raise _unexplained(min_pairs, observed)
     tree = cKDTree(landmarks.xy)
