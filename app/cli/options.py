@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..pipeline.settings import Settings
 
 RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
@@ -45,6 +47,32 @@ def check_folder(file: Path) -> None:
         raise FileNotFoundError(
             errno.ENOENT, "is not a file in a folder that exists; give one for --output", str(file)
         )
+
+
+def check_output(file: Path | None, *formats: str) -> None:
+    """As `check_folder`, if there is to be one. Raises EvaluationError unless its name ends in one of the formats."""
+    if file is not None:
+        from lidarcore.evaluation.consistency.tables import check
+
+        check(file, formats)
+        check_folder(file)
+
+
+def console(width: int) -> "Console":
+    """The terminal; a file or a pipe is as wide as the tables need."""
+    from rich.console import Console
+
+    terminal = Console()
+    return terminal if terminal.is_terminal else Console(width=width)
+
+
+def numbers(option: str, text: str, meaning: str, example: str) -> list[float]:
+    """As many numbers as the example has, separated by commas. Raises BadParameter."""
+    with suppress(ValueError):
+        found = [float(part) for part in text.split(",")]
+        if len(found) == len(example.split(",")):
+            return found
+    raise typer.BadParameter(f"{option} {text!r} should be {meaning}: {example}.")
 
 
 @contextmanager

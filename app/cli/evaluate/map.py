@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from ..options import RecordingPath, Set, SettingsFile, Topic, counting, numbers, settings_from
 
 if TYPE_CHECKING:
     from lidarcore import Array
@@ -48,11 +48,11 @@ def evaluate_map(
     chosen = settings_from(settings, set_)
     verified = None if relations is None else read_relations(relations)
     scans = list(open_recording(recording, topic, chosen.sensor.mask))
-    sigmas = _sigmas(own)
+    distance, turn = numbers("--own", own, "two numbers, m and rad", "0.02,0.005")
     for number in range(seed, seed + seeds):
         given, reference = prepared(scans, odometry, number)
         with counting("scans") as count:
-            judged = study(given, reference, mapper_settings(chosen), verified, sigmas, count)
+            judged = study(given, reference, mapper_settings(chosen), verified, (distance, turn), count)
         if seeds > 1:
             typer.echo(f"seed {number}")
         for name, value in lines(judged):
@@ -105,11 +105,3 @@ def _errors(off: "Array") -> str:
         f"mean {mean[0]:.4f} m, {degrees(mean[1]):.3f} degrees; "
         f"largest {worst[0]:.3f} m, {degrees(worst[1]):.2f} degrees"
     )
-
-
-def _sigmas(text: str) -> tuple[float, float]:
-    try:
-        distance, turn = map(float, text.split(","))
-    except ValueError:
-        raise typer.BadParameter(f"--own {text!r} should be two numbers, m and rad: 0.02,0.005.") from None
-    return distance, turn
