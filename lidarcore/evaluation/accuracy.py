@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from lidarcore.extraction import extract
 from lidarcore.features import Features, Segments
-from lidarcore.geometry import act_inverse, unit_vectors
+from lidarcore.geometry import act_inverse, left_of, unit_vectors
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Ints
 from lidarcore.settings import ExtractionSettings
@@ -106,7 +106,7 @@ def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> NDArra
     origin, along = walls[:, 0], walls[:, 1] - walls[:, 0]
     length = np.linalg.norm(along, axis=1)
     tangent = along / length[:, None]
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], 1)
+    normal = left_of(tangent)
     across = [np.abs(((p[:, None] - origin) * normal).sum(-1)) for p in (start, end)]
     middle = (((start + end)[:, None] / 2 - origin) * tangent).sum(-1)
     near: NDArray[np.bool_] = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
@@ -138,7 +138,7 @@ def _views(walls: Array, hit: Ints, bearings: Array) -> list[_View]:
 def _extent(wall: Array, bearings: Array) -> float:
     """Length (m) of the part of a wall between beams at these bearings."""
     tangent = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])
-    normal = np.array([-tangent[1], tangent[0]])
+    normal = left_of(tangent)
     u = unit_vectors(bearings)
     return float(np.ptp((wall[0] @ normal) / (u @ normal) * (u @ tangent)))
 

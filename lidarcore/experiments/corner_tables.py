@@ -11,10 +11,10 @@ from lidarcore.experiments.corner_study import CornerStudy
 from lidarcore.experiments.environments import Environment
 from lidarcore.lines import FITTERS
 from lidarcore.reporting import Map, chart
+from lidarcore.reporting.charts import SIGMAS_95
 from lidarcore.scan import Array
 
 SCALE = 10  # of the ellipses in maps, as in [WCTLS, Fig. 3]
-_OF_95 = 2.4477  # sigmas of the ellipses that maps draw
 _MARGIN = 0.6  # m
 
 
@@ -81,7 +81,7 @@ def maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str,
         drawn = Map(
             title, (low[0], high[0], low[1], high[1]), np.empty((0, 2)), 0.0, [],
             [("scan", points), ("seen", np.zeros((1, 2)))],
-            [(style, corners, (SCALE / _OF_95) ** 2 * of(name)) for name, style in styles.items()],
+            [(style, corners, (SCALE / SIGMAS_95) ** 2 * of(name)) for name, style in styles.items()],
             texts=numbers, texts_at=_aside(corners),
         )  # fmt: skip
         panels.append((title, chart(drawn, 560)))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.trials import Trials
 from lidarcore.evaluation.intervals import Interval, ratio, share
+from lidarcore.geometry import left_of
 from lidarcore.scan import Array
 
 Mask = NDArray[np.bool_]
@@ -102,7 +103,7 @@ def tally(trials: Trials) -> Array:
             found.size,
             found.sum(),
             np.einsum("pki,pi->", e, sight),
-            np.einsum("pki,pi->", e, sight[:, ::-1] * [-1, 1]),
+            np.einsum("pki,pi->", e, left_of(sight)),
             squares.sum(),
             (squares.sum(1) / np.trace(trials.bounds, axis1=1, axis2=2)).sum(),
             ((e.sum(1) ** 2).sum(-1) - squares.sum(1)).sum(),
