@@ -1,8 +1,18 @@
-"""How settings declare a number."""
+"""How settings, and the numbers among them, are declared."""
 
-from typing import Any
+from dataclasses import field
+from typing import Any, TypeVar, dataclass_transform
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
+
+T = TypeVar("T")
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
+def settings(declared: type[T]) -> type[T]:
+    """An immutable dataclass, given by keywords, that checks its values and refuses names it does not know."""
+    return dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)(declared)  # type: ignore[return-value]
 
 
 def number(low: float, high: float, unit: str, text: str, *, default: Any = ...) -> Any:

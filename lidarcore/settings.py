@@ -6,17 +6,16 @@ Command line, REST, page and documentation derive from these declarations.
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, field_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, field_validator
 
-from lidarcore.fields import number
+from lidarcore.fields import number, settings
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise
 
 Covariance = Literal["consistent", "published", "map"]
 
 
-@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+@settings
 class ExtractionSettings:
     """How a scan becomes segments and corners. Metres and radians; immutable, so a scan never sees a half change.
 

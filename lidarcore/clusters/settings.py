@@ -3,15 +3,14 @@
 from dataclasses import field
 from typing import Annotated
 
-from pydantic import ConfigDict, Field, field_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, field_validator
 
 from lidarcore.clusters.registry import CLUSTERERS
-from lidarcore.fields import number
+from lidarcore.fields import number, settings
 from lidarcore.noise import SensorNoise
 
 
-@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+@settings
 class ClusterSettings:
     """How a scan becomes clusters. Metres; immutable, so a scan never sees a half change.
 

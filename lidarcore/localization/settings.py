@@ -4,17 +4,14 @@ from dataclasses import field
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, model_validator
 
-from lidarcore.fields import number
+from lidarcore.fields import number, settings
 from lidarcore.localization.ekf.kernels import odometry_variances
 from lidarcore.scan import Array
 
-_CONFIG = ConfigDict(extra="forbid")
 
-
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class OdometryNoise:
     """Random walk of odometry: variances grow with the way and the turn, however finely they are cut into steps."""
 
@@ -90,7 +87,7 @@ class OdometryNoise:
         return np.diag(odometry_variances(np.asarray(increment, np.float64), dt, self.table))
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class VelocityNoise:
     """White accelerations of the constant-velocity model."""
 
@@ -133,7 +130,7 @@ class VelocityNoise:
     )
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class LocalizationSettings:
     """How the filter moves, matches and keeps landmarks. Immutable; pydantic.ValidationError names a wrong field."""
 
@@ -221,7 +218,7 @@ class LocalizationSettings:
         return self
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class NavigationSettings:
     """What a Navigator does with each scan. Immutable; pydantic.ValidationError names a wrong field."""
 

@@ -4,19 +4,16 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, model_validator
 
-from lidarcore.fields import number
+from lidarcore.fields import number, settings
 from lidarcore.localization.settings import OdometryNoise
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array
 from lidarcore.simulation.worlds import WORLDS, place
 
-_CONFIG = ConfigDict(extra="forbid")
 
-
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class OdometryError:
     """How odometry errs: a random walk as filters assume, and systematic errors of wheels as they do not."""
 
@@ -44,7 +41,7 @@ class OdometryError:
         return measured
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class SimulationSettings:
     """Where a simulated robot drives and what it perceives. Immutable; pydantic.ValidationError names a wrong field."""
 
