@@ -3,13 +3,12 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.extraction import extract
 from lidarcore.features import Features, Segments
 from lidarcore.geometry import act_inverse, left_of, unit_vectors
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
 from lidarcore.simulation.world import World
@@ -101,7 +100,7 @@ def _count(
             result.corner_errors.append(float(distances.min()))
 
 
-def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> NDArray[np.bool_]:
+def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> Bools:
     """(M, W) true where both ends of a segment are within tolerance of a wall, and its middle is on it."""
     origin, along = walls[:, 0], walls[:, 1] - walls[:, 0]
     length = np.linalg.norm(along, axis=1)
@@ -109,17 +108,15 @@ def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> NDArra
     normal = left_of(tangent)
     across = [np.abs(((p[:, None] - origin) * normal).sum(-1)) for p in (start, end)]
     middle = (((start + end)[:, None] / 2 - origin) * tangent).sum(-1)
-    near: NDArray[np.bool_] = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
+    near: Bools = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
     return near
 
 
-def _covered_beams(segments: Segments, beams: int) -> NDArray[np.bool_]:
+def _covered_beams(segments: Segments, beams: int) -> Bools:
     """(M, N) true where a segment covers a beam."""
     first, last = segments.first_beam[:, None], segments.last_beam[:, None]
     k = np.arange(beams)
-    inside: NDArray[np.bool_] = np.where(
-        first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last)
-    )
+    inside: Bools = np.where(first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last))
     return inside
 
 

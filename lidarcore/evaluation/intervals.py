@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from lidarcore.scan import Array
+from lidarcore.arrays import Array
 
 LEVEL = 0.95
 _Z = 1.959964  # of a normal, two-sided at LEVEL

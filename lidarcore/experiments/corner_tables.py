@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from lidarcore import reporting
+from lidarcore.arrays import Array
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.experiments.corner_study import CornerStudy
@@ -12,7 +13,6 @@ from lidarcore.experiments.environments import Environment
 from lidarcore.lines import FITTERS
 from lidarcore.reporting import Map, chart
 from lidarcore.reporting.charts import SIGMAS_95
-from lidarcore.scan import Array
 
 SCALE = 10  # of the ellipses in maps, as in [WCTLS, Fig. 3]
 _MARGIN = 0.6  # m

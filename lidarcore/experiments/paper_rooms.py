@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.repeatability.places import Place, look, shared_ends
 from lidarcore.geometry import left_of
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 from lidarcore.simulation.rooms import box, polygon
 from lidarcore.simulation.world import World
 

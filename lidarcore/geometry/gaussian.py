@@ -3,9 +3,9 @@
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from lidarcore.arrays import Array, Numbers
+from lidarcore.arrays import Array, Bools, Numbers
 from lidarcore.errors import CovarianceError
 from lidarcore.geometry.se2 import unit_vectors
 
@@ -38,7 +38,7 @@ def chi_square_gate(probability: float, dimensions: int = 2) -> float:
     return float(chdtri(dimensions, 1 - probability))
 
 
-def contains(difference: Array, covariance: Array, probability: float) -> NDArray[np.bool_]:
+def contains(difference: Array, covariance: Array, probability: float) -> Bools:
     """(...,) true where a difference (..., n) lies in the ellipse that holds this share of its Gaussian."""
     gate = chi_square_gate(probability, difference.shape[-1])
     return np.asarray(squared_mahalanobis(difference, covariance) <= gate)

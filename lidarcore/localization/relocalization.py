@@ -7,9 +7,9 @@ Two observed points and two landmarks equally far apart fix a pose; the pose tha
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import LostError
 from lidarcore.geometry import (
     act,
@@ -20,7 +20,6 @@ from lidarcore.geometry import (
     wrap,
 )
 from lidarcore.localization.points import Points
-from lidarcore.scan import Array, Ints
 
 _FAR = 6.0  # standard deviations; what is known of a pose after a gap is rough
 _SIGMAS = 4.0
@@ -83,7 +82,7 @@ def relocalize(observed: Points, landmarks: Points, near: tuple[Array, Array] | 
     return found[0]
 
 
-def _are_near(poses: Array, pose: Array, covariance: Array) -> NDArray[np.bool_]:
+def _are_near(poses: Array, pose: Array, covariance: Array) -> Bools:
     """(H,) true for the poses within _FAR standard deviations of a pose."""
     return np.asarray(squared_mahalanobis(pose_difference(poses, pose), covariance) < _FAR**2)
 
@@ -155,9 +154,7 @@ def _counts(poses: Array, observed: Points, landmarks: Points, tree: cKDTree) ->
     return counts
 
 
-def _nearest(
-    placed: Array, observed: Points, landmarks: Points, tree: cKDTree
-) -> tuple[Ints, NDArray[np.bool_]]:
+def _nearest(placed: Array, observed: Points, landmarks: Points, tree: cKDTree) -> tuple[Ints, Bools]:
     """The nearest landmark (..., K) of points placed (..., K, 2) m in the world, and whether it is close enough."""
     distance, nearest = tree.query(placed)
     reach = np.sqrt(

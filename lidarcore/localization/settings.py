@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from lidarcore.arrays import Array
 from lidarcore.fields import number, settings
 from lidarcore.localization.ekf.kernels import odometry_variances
-from lidarcore.scan import Array
 
 
 @settings

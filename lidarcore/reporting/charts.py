@@ -6,8 +6,8 @@ from html import escape
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import ellipse_outline
-from lidarcore.scan import Array
 
 WIDTH = 380  # units of a panel, which are pixels where three fit beside each other
 _LABELS, _VALUES, _ROW = 112, 80, 20  # units left and right of the bars, and from row to row

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.spatial import KDTree
 
+from lidarcore.arrays import Array
 from lidarcore.errors import SimulationError
 from lidarcore.geometry import left_of
-from lidarcore.scan import Array
 from lidarcore.simulation.posts import distances_to_circles
 from lidarcore.simulation.rooms import random_pose
 from lidarcore.simulation.world import World

@@ -6,10 +6,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from lidarcore.arrays import Array
 from lidarcore.fields import number, settings
 from lidarcore.localization.settings import OdometryNoise
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 from lidarcore.simulation.worlds import WORLDS, place
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.errors import SimulationError
-from lidarcore.scan import Array
 from lidarcore.simulation.office import LENGTH, MIDDLE, WIDTH, office
 from lidarcore.simulation.paths import ROUND, Path, standing, wandering
 from lidarcore.simulation.posts import Posts, scattered

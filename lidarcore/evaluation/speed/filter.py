@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.speed.extraction import Timing, time_calls
 from lidarcore.geometry import act_inverse
 from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
@@ -12,7 +13,6 @@ from lidarcore.localization.ekf import kernels
 from lidarcore.localization.ekf.motion import OdometryMotion
 from lidarcore.localization.ekf.passive import one_thread
 from lidarcore.localization.landmarks import Landmarks
-from lidarcore.scan import Array
 
 CORNERS = 12  # landmarks in sight of the localizer
 REACH, SPACING = 5.0, 2.2  # m, how far SLAM sees; m between landmarks
