@@ -1,5 +1,6 @@
 """Foreign files are read in a process of their own: it may take MEMORY and QUIET, and is killed beyond that."""
 
+import resource
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -93,8 +94,4 @@ def _work(
 
 
 def _limit_memory() -> None:
-    try:
-        import resource
-    except ImportError:  # Windows has no such limit
-        return
     resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))

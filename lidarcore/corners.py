@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
-from lidarcore.scan import Array
 from lidarcore.tables import (
     CORNER_CONSISTENT,
     CORNER_MAP,

@@ -6,13 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import inlined, kernel
 from lidarcore.corners import find_corners
 from lidarcore.features import Features
 from lidarcore.lines import FITTER_IDS, FITTERS, WORK
 from lidarcore.noise import NoiseModel
 from lidarcore.polar import cos_sin
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 from lidarcore.segmentation import (
     Cuts,
     Pieces,

@@ -1,19 +1,35 @@
-"""How settings declare a number, and how they show themselves."""
+"""How settings, and the numbers among them, are declared, and how they show themselves."""
 
+from dataclasses import field
 from inspect import signature
-from typing import Any, TypeVar
+from typing import Any, TypeVar, dataclass_transform
 
-from pydantic import Field
+from pydantic import ConfigDict, Field
+from pydantic.dataclasses import dataclass
 
-_Class = TypeVar("_Class", bound=type[object])
+T = TypeVar("T")
 
 
-def number(low: float, high: float, unit: str, text: str) -> Any:
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
+def settings(declared: type[T]) -> type[T]:
+    """An immutable dataclass, given by keywords, that checks its values and refuses names it does not know."""
+    return dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)(declared)  # type: ignore[return-value]
+
+
+def number(low: float, high: float, unit: str, text: str, *, default: Any = ...) -> Any:
     """A finite number from low to high, with its unit and meaning, as JSON schema, page and command line show them."""
-    return Field(ge=low, le=high, allow_inf_nan=False, description=text, json_schema_extra={"unit": unit})
+    return Field(
+        default,
+        ge=low,
+        le=high,
+        allow_inf_nan=False,
+        description=text,
+        json_schema_extra={"unit": unit},
+        kw_only=None if default is ... else True,  # for a default, pydantic does not heed the class's kw_only
+    )
 
 
-def plainly(settings: _Class) -> _Class:
+def plainly(settings: type[T]) -> type[T]:
     """Names and defaults alone for the signature, with which `help` begins: with all bounds it fills a screen."""
     full = signature(settings)
     names = [parameter.replace(annotation=parameter.empty) for parameter in full.parameters.values()]

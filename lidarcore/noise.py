@@ -52,62 +52,46 @@ class SensorNoise:
     noise model of the papers: white errors on perfectly straight walls.
     """
 
-    sigma_range: Annotated[
-        Metres, Field(description="standard deviation of a range. More: larger ellipses, fewer splits")
-    ] = 0.02
-    sigma_bearing: Annotated[
-        Radians,
-        Field(
-            description="standard deviation of a bearing. More: larger ellipses where walls are far or seen at a slant"
-        ),
-    ] = 0.0034
-    range_growth: Annotated[
-        Growth,
-        Field(
-            description="times the square of a range: what its standard deviation grows by. More: far walls count less"
-        ),
-    ] = 0.0
-    unevenness: Annotated[
-        Deviation,
-        Field(
-            description="standard deviation of a wall's surface from a straight line. More: larger ellipses"
-        ),
-    ] = 0.0
-    unevenness_length: Annotated[
-        Length,
-        Field(
-            description="distance along a wall over which its unevenness is alike (correlation 1/e). More: long "
-            "walls are known less well"
-        ),
-    ] = 0.08
-    systematic: Annotated[
-        Deviation,
-        Field(
-            description="what a wall is off by in every scan from one place. More: larger ellipses in maps"
-        ),
-    ] = 0.0
+    sigma_range: Metres = Field(
+        default=0.02, description="standard deviation of a range. More: larger ellipses, fewer splits"
+    )
+    sigma_bearing: Radians = Field(
+        default=0.0034,
+        description="standard deviation of a bearing. More: larger ellipses where walls are far or seen at a slant",
+    )
+    range_growth: Growth = Field(
+        default=0.0,
+        description="times the square of a range: what its standard deviation grows by. More: far walls count less",
+    )
+    unevenness: Deviation = Field(
+        default=0.0,
+        description="standard deviation of a wall's surface from a straight line. More: larger ellipses",
+    )
+    unevenness_length: Length = Field(
+        default=0.08,
+        description="distance along a wall over which its unevenness is alike (correlation 1/e). More: long "
+        "walls are known less well",
+    )
+    systematic: Deviation = Field(
+        default=0.0,
+        description="what a wall is off by in every scan from one place. More: larger ellipses in maps",
+    )
 
-    tails: Annotated[
-        Tails,
-        Field(
-            description="weight of the tails of errors: 1 over Student's degrees of freedom, 0 for Gaussian. More: "
-            "single points that are far off count less"
-        ),
-    ] = 0.0
-    renewal: Annotated[
-        Share,
-        Field(
-            description="share of the unevenness that changes from scan to scan at the same place: 1 if "
-            "nothing of it repeats, 0 if all of it does. More: a standing sensor's corners scatter more"
-        ),
-    ] = 1.0
-    resampling: Annotated[
-        Share,
-        Field(
-            description="how far beams fall elsewhere on the unevenness that repeats: 1 anywhere between their "
-            "neighbours in every revolution, 0 on the same spots. More: a standing sensor's corners scatter more"
-        ),
-    ] = 0.0
+    tails: Tails = Field(
+        default=0.0,
+        description="weight of the tails of errors: 1 over Student's degrees of freedom, 0 for Gaussian. More: "
+        "single points that are far off count less",
+    )
+    renewal: Share = Field(
+        default=1.0,
+        description="share of the unevenness that changes from scan to scan at the same place: 1 if "
+        "nothing of it repeats, 0 if all of it does. More: a standing sensor's corners scatter more",
+    )
+    resampling: Share = Field(
+        default=0.0,
+        description="how far beams fall elsewhere on the unevenness that repeats: 1 anywhere between their "
+        "neighbours in every revolution, 0 on the same spots. More: a standing sensor's corners scatter more",
+    )
 
     def model(self, latent: bool = False) -> NoiseModel:
         """The noise as kernels take it; latent: whether ml looks for the true bearings."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import ordered_kernel
-from lidarcore.scan import Array
 
 _TWO_OVER_PI = 2 / np.pi
 # pi/2 in three pieces whose products with small integers are exact (Cody and Waite's reduction).

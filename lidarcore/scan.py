@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import ScanError
 from lidarcore.geometry import unit_vectors
 
@@ -87,7 +87,7 @@ class Scan:
         return f"Scan({len(self)} beams, {int(self.valid.sum())} returns, stamp={self.stamp:.3f} s)"
 
     @cached_property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Bools:
         """(N,) true where the beam returned."""
         return ~np.isnan(self.ranges)
 

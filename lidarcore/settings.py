@@ -6,10 +6,9 @@ Command line, REST, page and documentation derive from these declarations.
 from dataclasses import field
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Field, field_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, field_validator
 
-from lidarcore.fields import number, plainly
+from lidarcore.fields import number, plainly, settings
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise
 
@@ -17,7 +16,7 @@ Covariance = Literal["consistent", "published", "map"]
 
 
 @plainly
-@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+@settings
 class ExtractionSettings:
     """How a scan becomes segments and corners. Metres and radians; immutable, so a scan never sees a half change.
 
@@ -33,26 +32,22 @@ class ExtractionSettings:
         bool,
         Field(description="ml looks for each beam's true bearing: without bias at grazing incidence"),
     ] = True
-    split_threshold: Annotated[
-        float,
-        number(
-            0.005,
-            1.0,
-            "m",
-            "a piece is split where a point is farther from its chord than this and than noise explains; where the "
-            "unevenness of walls is given, noise and unevenness decide alone. More: fewer, longer walls",
-        ),
-    ] = 0.05
-    gap: Annotated[
-        float,
-        number(
-            0.02,
-            5.0,
-            "m",
-            "neighbouring points farther apart are not connected, unless as on a wall seen at a grazing angle. More: "
-            "walls go on across wider gaps",
-        ),
-    ] = 0.3
+    split_threshold: float = number(
+        0.005,
+        1.0,
+        "m",
+        "a piece is split where a point is farther from its chord than this and than noise explains; where the "
+        "unevenness of walls is given, noise and unevenness decide alone. More: fewer, longer walls",
+        default=0.05,
+    )
+    gap: float = number(
+        0.02,
+        5.0,
+        "m",
+        "neighbouring points farther apart are not connected, unless as on a wall seen at a grazing angle. More: "
+        "walls go on across wider gaps",
+        default=0.3,
+    )
     min_points: Annotated[
         int,
         Field(
@@ -61,9 +56,9 @@ class ExtractionSettings:
             description="a segment needs at least this many points. More: fewer short or far walls",
         ),
     ] = 6
-    min_length: Annotated[
-        float, number(0.0, 10.0, "m", "a segment must be at least this long. More: short walls are rejected")
-    ] = 0.2
+    min_length: float = number(
+        0.0, 10.0, "m", "a segment must be at least this long. More: short walls are rejected", default=0.2
+    )
     corner_angle: Annotated[
         float,
         Field(
@@ -74,16 +69,14 @@ class ExtractionSettings:
             json_schema_extra={"unit": "rad"},
         ),
     ] = 0.35
-    corner_gap: Annotated[
-        float,
-        number(
-            0.01,
-            2.0,
-            "m",
-            "both facing ends must be this close to the intersection, beyond point spacing and noise. More: corners "
-            "also where walls do not quite meet",
-        ),
-    ] = 0.2
+    corner_gap: float = number(
+        0.01,
+        2.0,
+        "m",
+        "both facing ends must be this close to the intersection, beyond point spacing and noise. More: corners "
+        "also where walls do not quite meet",
+        default=0.2,
+    )
 
     @field_validator("fitter")
     @classmethod

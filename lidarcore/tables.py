@@ -1,5 +1,6 @@
 """The columns of the table that kernels write and `Features` reads: rows of segments, of corners, of rejections."""
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
 from lidarcore.lines.regression import (
     DISTANCE,
@@ -9,7 +10,6 @@ from lidarcore.lines.regression import (
     LINE_PUBLISHED,
     NORMAL,
 )
-from lidarcore.scan import Array
 
 __all__ = ["DISTANCE", "LINE_CONSISTENT", "LINE_FIELDS", "LINE_MAP", "LINE_PUBLISHED", "NORMAL"]
 

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from ..pipeline.settings import Settings
 
 RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
@@ -53,16 +55,16 @@ def check_folder(file: Path, option: str = "--output") -> None:
     _check_writable(file.absolute().parent, file, option)
 
 
-def check_new_folder(folder: Path, option: str = "--output") -> None:
+def check_new_folder(folder: Path) -> None:
     """As `check_folder`, for a folder that may have to be made."""
     there = next(path for path in (folder, *folder.absolute().parents) if path.exists())
     if not there.is_dir():
         raise NotADirectoryError(
             errno.ENOTDIR,
-            f"cannot be a folder, since {there} is a file; give another one for {option}",
+            f"cannot be a folder, since {there} is a file; give another one for --output",
             str(folder),
         )
-    _check_writable(there, folder, option)
+    _check_writable(there, folder, "--output")
 
 
 def _check_writable(folder: Path, path: Path, option: str) -> None:
@@ -77,6 +79,32 @@ def _check_writable(folder: Path, path: Path, option: str) -> None:
 def plural(number: int, noun: str) -> str:
     """'1 scan', '2 scans'."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def check_output(file: Path | None, *formats: str) -> None:
+    """As `check_folder`, if there is to be one. Raises EvaluationError unless its name ends in one of the formats."""
+    if file is not None:
+        from lidarcore.evaluation.consistency.tables import check
+
+        check(file, formats)
+        check_folder(file)
+
+
+def console(width: int) -> "Console":
+    """The terminal; a file or a pipe is as wide as the tables need."""
+    from rich.console import Console
+
+    terminal = Console()
+    return terminal if terminal.is_terminal else Console(width=width)
+
+
+def numbers(option: str, text: str, meaning: str, example: str) -> list[float]:
+    """As many numbers as the example has, separated by commas. Raises BadParameter."""
+    with suppress(ValueError):
+        found = [float(part) for part in text.split(",")]
+        if len(found) == len(example.split(",")):
+            return found
+    raise typer.BadParameter(f"{option} {text!r} should be {meaning}: {example}.")
 
 
 @contextmanager

@@ -75,13 +75,13 @@ class LandmarkStore:
         """The session that is written, or used; None if there is none yet."""
         return self._run.session if self._run else self._used
 
-    def begin(self, source: str, mode: str = "slam", replay: Hashable = None) -> LandmarkRun:
+    def begin(self, source: str, replay: Hashable = None) -> LandmarkRun:
         """A run begins with an empty map of its own, and the one before ends.
 
         Of runs with the same `replay`, which lead to the same map, the last one that was finished is kept.
         """
         self.use(None)
-        self._run = run = LandmarkRun(MapWriter(self.atlas, source, mode), self._queue.schedule, replay)
+        self._run = run = LandmarkRun(MapWriter(self.atlas, source, "slam"), self._queue.schedule, replay)
         return run
 
     def begin_walls(self, source: str, replay: Hashable = None) -> WallRun:

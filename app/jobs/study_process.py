@@ -35,7 +35,7 @@ class StudyProcess:
             errors="replace",
             start_new_session=True,
         )
-        with suppress(OSError, AttributeError):  # gone already; Windows has no such call
+        with suppress(OSError):  # gone already
             os.setpriority(os.PRIO_PROCESS, self._process.pid, NICE)
         self._reader = threading.Thread(target=self._read, name="study", daemon=True)
         self._reader.start()

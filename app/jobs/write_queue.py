@@ -58,6 +58,8 @@ class WriteQueue:
             self._waiting[run] = replace(newest, since=before.since, ended=newest.ended or before.ended)
             while len(self._waiting) > MOST_RUNS:
                 del self._waiting[next(iter(self._waiting))]
+                self.error = f"More than {MOST_RUNS} maps waited to be written: the oldest is lost."
+                logger.warning(self.error)
             self._news.notify()
 
     def _work(self) -> None:
@@ -85,19 +87,22 @@ class WriteQueue:
             self.error = None
             if change:
                 self._written(change)
-        except LidarError as error:
+        except Exception as error:
             return self._put_back(run, waiting, error)
-        except Exception:
-            logger.exception("the map could not be written")
-            self.error = "The map is not written: the log of the server says why."
-            return RETRY
         return PAUSE if change else 0.0
 
-    def _put_back(self, run: StoredRun, waiting: Waiting, error: LidarError) -> float:
+    def _put_back(self, run: StoredRun, waiting: Waiting, error: Exception) -> float:
         """A run waits on if nothing newer does; but a deleted map does not come back when its run has ended."""
         is_deleted = isinstance(error, UnknownLandmarkError | UnknownSessionError)
         if not (is_deleted and waiting.ended):
             with self._news:
                 self._waiting[run] = replace(self._waiting.get(run, waiting), since=waiting.since)
-        self.error = None if is_deleted else str(error)
-        return PAUSE if is_deleted else RETRY
+        if is_deleted:
+            self.error = None
+            return PAUSE
+        if isinstance(error, LidarError):
+            self.error = str(error)
+        else:
+            logger.error("the map could not be written", exc_info=error)
+            self.error = "The map is not written: the log of the server says why."
+        return RETRY

@@ -29,29 +29,27 @@ class _Frozen(BaseModel):
 class Layers(_Frozen):
     """What the scene shows, where a browser does not show it otherwise."""
 
-    points: Annotated[bool, Field(description="measured points")] = True
-    segments: Annotated[bool, Field(description="wall segments")] = True
-    corners: Annotated[bool, Field(description="corners")] = True
-    ellipses: Annotated[bool, Field(description="covariance ellipses of the corners")] = True
-    rejected: Annotated[bool, Field(description="candidates that were rejected")] = False
-    grid: Annotated[bool, Field(description="grid in metres")] = True
-    sensor: Annotated[bool, Field(description="the sensor")] = True
-    gaps: Annotated[bool, Field(description="sectors whose data were lost")] = True
-    clusters: Annotated[bool, Field(description="clusters, each with the ellipse of its members")] = False
-    pose: Annotated[bool, Field(description="the ellipse of the sensor's position")] = True
-    trail: Annotated[bool, Field(description="estimated path of the sensor")] = True
-    dead_reckoned: Annotated[bool, Field(description="its path by odometry alone")] = True
-    truth: Annotated[bool, Field(description="its true path, if known")] = True
-    occupancy: Annotated[
-        bool, Field(description="which parts of the map of whole scans are occupied and free")
-    ] = True
-    walls: Annotated[bool, Field(description="walls of the map of whole scans")] = True
-    landmarks: Annotated[bool, Field(description="landmarks of the map with their ellipses and numbers")] = (
-        True
+    points: bool = Field(default=True, description="measured points")
+    segments: bool = Field(default=True, description="wall segments")
+    corners: bool = Field(default=True, description="corners")
+    ellipses: bool = Field(default=True, description="covariance ellipses of the corners")
+    rejected: bool = Field(default=False, description="candidates that were rejected")
+    grid: bool = Field(default=True, description="grid in metres")
+    sensor: bool = Field(default=True, description="the sensor")
+    gaps: bool = Field(default=True, description="sectors whose data were lost")
+    clusters: bool = Field(default=False, description="clusters, each with the ellipse of its members")
+    pose: bool = Field(default=True, description="the ellipse of the sensor's position")
+    trail: bool = Field(default=True, description="estimated path of the sensor")
+    dead_reckoned: bool = Field(default=True, description="its path by odometry alone")
+    truth: bool = Field(default=True, description="its true path, if known")
+    occupancy: bool = Field(
+        default=True, description="which parts of the map of whole scans are occupied and free"
     )
-    associations: Annotated[
-        bool, Field(description="lines from observations to the landmarks they match")
-    ] = True
+    walls: bool = Field(default=True, description="walls of the map of whole scans")
+    landmarks: bool = Field(default=True, description="landmarks of the map with their ellipses and numbers")
+    associations: bool = Field(
+        default=True, description="lines from observations to the landmarks they match"
+    )
 
 
 class ViewSettings(_Frozen):
@@ -61,31 +59,26 @@ class ViewSettings(_Frozen):
     belong to each browser, which may show them otherwise than they are set here; setting one here sets it for all.
     """
 
-    compare: Annotated[bool, Field(description="several methods on the same scan at once")] = False
-    methods: Annotated[
-        tuple[str, ...],
-        Field(
-            description="methods shown in compare mode",
-            json_schema_extra={"items": {"type": "string", "enum": list(FITTERS)}, "uniqueItems": True},
-        ),
-    ] = tuple(FITTERS)
+    compare: bool = Field(default=False, description="several methods on the same scan at once")
+    methods: tuple[str, ...] = Field(
+        default=tuple(FITTERS),
+        description="methods shown in compare mode",
+        json_schema_extra={"items": {"type": "string", "enum": list(FITTERS)}, "uniqueItems": True},
+    )
     layers: Layers = Layers()
-    colour: Annotated[Colour, Field(description="what colours the points")] = "plain"
-    ellipse_scale: Annotated[
-        float,
-        Field(
-            ge=1,
-            le=100,
-            allow_inf_nan=False,
-            description="size of the corners' ellipses in sigma. "
-            "More: larger ellipses on the screen; what they claim stays",
-        ),
-    ] = 30.0
-    theme: Annotated[
-        Literal["dark", "light"],
-        Field(description="colours of the scene, and of a browser that prefers none"),
-    ] = "dark"
-    rotate: Annotated[bool, Field(description="free rotation instead of a map seen from above")] = False
+    colour: Colour = Field(default="plain", description="what colours the points")
+    ellipse_scale: float = Field(
+        default=30.0,
+        ge=1,
+        le=100,
+        allow_inf_nan=False,
+        description="size of the corners' ellipses in sigma. "
+        "More: larger ellipses on the screen; what they claim stays",
+    )
+    theme: Literal["dark", "light"] = Field(
+        default="dark", description="colours of the scene, and of a browser that prefers none"
+    )
+    rotate: bool = Field(default=False, description="free rotation instead of a map seen from above")
 
     @field_validator("methods")
     @classmethod
@@ -99,15 +92,13 @@ class ViewSettings(_Frozen):
 class RepeatabilitySettings(_Frozen):
     """Whether the scatter of the corners is held against what each method claims, while the sensor stands still."""
 
-    running: Annotated[bool, Field(description="whether new scans are compared")] = False
-    window: Annotated[
-        int,
-        Field(
-            ge=LEAST,
-            le=1000,
-            description="how many of the newest scans to compare. More: surer verdicts, later",
-        ),
-    ] = WINDOW
+    running: bool = Field(default=False, description="whether new scans are compared")
+    window: int = Field(
+        default=WINDOW,
+        ge=LEAST,
+        le=1000,
+        description="how many of the newest scans to compare. More: surer verdicts, later",
+    )
 
 
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
@@ -123,14 +114,12 @@ class LiveNavigation(NavigationSettings):
 class SensorSettings(_Frozen):
     """How the sensor sits on its robot."""
 
-    mask: Annotated[
-        Mask | None,
-        Field(
-            description="sectors, from `first` counter-clockwise to `last` (rad), in which the robot's own body is "
-            "seen: what is nearer than `reach` (m) is left out before everything else; if not given, those kept "
-            "with the recording"
-        ),
-    ] = None
+    mask: Mask | None = Field(
+        default=None,
+        description="sectors, from `first` counter-clockwise to `last` (rad), in which the robot's own body is "
+        "seen: what is nearer than `reach` (m) is left out before everything else; if not given, those kept "
+        "with the recording",
+    )
 
 
 class Settings(_Frozen):

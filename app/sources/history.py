@@ -72,7 +72,8 @@ class HistorySource(Source):
     def _take(self, scan: Scan, arrival: float) -> None:
         """Keep a scan whose last byte came at `arrival` (time.monotonic, s), and tell of it."""
         with self._lock:
-            self._first_stamp = self._first_stamp or scan.stamp
+            if self._count == 0:
+                self._first_stamp = scan.stamp
             self._kept.append((scan, arrival))
             self._count += 1
         self._arrived()

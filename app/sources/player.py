@@ -53,10 +53,8 @@ class Player:
         hand_over: Callable[[TimedScan], None],
         is_idle: Callable[[], bool],
         changed: Callable[[], None],
-        *,
-        paused: bool = False,
     ) -> None:
-        self._source, self._paused = source, paused
+        self._source, self._paused = source, False
         self._hand_over, self._is_idle, self._on_change = hand_over, is_idle, changed
         self._opened = 0  # how many sources before this one
         self._seeks = 0

@@ -64,8 +64,8 @@ def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_b
     throttle_servers()
     threadpool_limits(1)  # matrices are small: a second thread only waits for its turn, up to 20 ms
     server = uvicorn_server(create_app(options))
-    if hasattr(signal, "SIGHUP"):  # the terminal was closed: the motor is to be stopped then, too
-        signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
+    # The terminal was closed: the motor is to be stopped then, too.
+    signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))
     url = address(listening, host, options.token)
     print(f"lidarcore serves {url}", flush=True)
     print("Stop with Ctrl-C.", flush=True)

@@ -1,6 +1,7 @@
 """How bytes come and go below HTTP: requests that never end are dropped, and frames for slow clients do not pile up."""
 
 import asyncio
+import resource
 import socket
 from asyncio.transports import BaseTransport, WriteTransport
 from typing import Any, ClassVar, cast
@@ -82,10 +83,6 @@ class PromptWebSockets(WebSocketsSansIOProtocol):
 
 def allow_many_files() -> None:
     """Ask for up to MOST_FILES file handles: systems often give 1,024, and each connection takes one."""
-    try:
-        import resource
-    except ImportError:  # Windows has no such limit
-        return
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
     if soft != resource.RLIM_INFINITY and soft < most:

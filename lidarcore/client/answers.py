@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypedDict
 
-from lidarcore.scan import Array
+from lidarcore.arrays import Array
 
 
 class Which(TypedDict, total=False):

@@ -6,11 +6,12 @@ point clouds and machine learning methods.
 
 import numpy as np
 
+from lidarcore.arrays import Ints
 from lidarcore.clusters.clusters import NONE, Clusters, summarise
 from lidarcore.clusters.registry import CLUSTERERS, Clusterer
 from lidarcore.clusters.settings import ClusterSettings
 from lidarcore.errors import ScanError
-from lidarcore.scan import Ints, Scan
+from lidarcore.scan import Scan
 
 __all__ = ["CLUSTERERS", "ClusterSettings", "Clusterer", "Clusters", "cluster"]
 

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 
 NONE = -1
 """Label of a beam that is in no cluster."""

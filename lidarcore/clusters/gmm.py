@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints
 
 if TYPE_CHECKING:
     from sklearn.mixture import GaussianMixture

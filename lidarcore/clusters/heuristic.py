@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarcore.scan import Array, Ints
+from lidarcore.arrays import Array, Ints
 
 
 def label(points: Array, distance: float) -> Ints:

@@ -3,7 +3,7 @@
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from lidarcore.scan import Array, Ints
+from lidarcore.arrays import Array, Ints
 
 HALVED_WALL = 2 - 1.25 * np.log(3)
 """Mean silhouette of the two halves of a straight wall evenly covered with points, 0.627: they are one object."""

@@ -6,8 +6,8 @@ A new method is one file with one function, one entry here, and its parameters i
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.clusters import dbscan, gmm, heuristic, kmeans
-from lidarcore.scan import Array, Ints
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,15 +3,14 @@
 from dataclasses import field
 from typing import Annotated
 
-from pydantic import ConfigDict, Field, field_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, field_validator
 
 from lidarcore.clusters.registry import CLUSTERERS
-from lidarcore.fields import number
+from lidarcore.fields import number, settings
 from lidarcore.noise import SensorNoise
 
 
-@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+@settings
 class ClusterSettings:
     """How a scan becomes clusters. Metres; immutable, so a scan never sees a half change.
 
@@ -22,24 +21,20 @@ class ClusterSettings:
     method: Annotated[
         str, Field(description="clustering method", json_schema_extra={"enum": list(CLUSTERERS)})
     ] = "heuristic"
-    distance: Annotated[
-        float,
-        number(
-            0.01,
-            10.0,
-            "m",
-            "heuristic: consecutive points farther apart are different objects. More: fewer, larger clusters",
-        ),
-    ] = 0.3
-    eps: Annotated[
-        float,
-        number(
-            0.01,
-            10.0,
-            "m",
-            "dbscan: points at most this far apart are neighbours. More: fewer, larger clusters",
-        ),
-    ] = 0.3
+    distance: float = number(
+        0.01,
+        10.0,
+        "m",
+        "heuristic: consecutive points farther apart are different objects. More: fewer, larger clusters",
+        default=0.3,
+    )
+    eps: float = number(
+        0.01,
+        10.0,
+        "m",
+        "dbscan: points at most this far apart are neighbours. More: fewer, larger clusters",
+        default=0.3,
+    )
     min_points: Annotated[
         int,
         Field(
@@ -68,16 +63,14 @@ class ClusterSettings:
             "More: more clusters where there are many things, and more time",
         ),
     ] = 12
-    max_range: Annotated[
-        float | None,
-        number(
-            0.1,
-            1000.0,
-            "m",
-            "points farther from the sensor are left out; none for all. "
-            "More: things farther away are clusters, too",
-        ),
-    ] = None
+    max_range: float | None = number(
+        0.1,
+        1000.0,
+        "m",
+        "points farther from the sensor are left out; none for all. "
+        "More: things farther away are clusters, too",
+        default=None,
+    )
     noise: SensorNoise = field(default_factory=SensorNoise)
 
     @field_validator("method")

@@ -3,13 +3,12 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.extraction import extract
 from lidarcore.features import Features, Segments
-from lidarcore.geometry import act_inverse, unit_vectors
+from lidarcore.geometry import act_inverse, left_of, unit_vectors
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
 from lidarcore.simulation.world import World
@@ -60,14 +59,14 @@ class _View:
     beams: Ints
 
 
-def measure_accuracy(sigma_range: float, scans: int, seed: int, fitter: str = "ml") -> Accuracy:
+def measure_accuracy(sigma_range: float, scans: int, seed: int) -> Accuracy:
     """Scans of the furnished room from random poses, against what can be seen in it.
 
     sigma_range in m; the bearing noise is 0.001 rad. Both are told to the extraction, all else is default.
     """
     rng, world, result = np.random.default_rng(seed), furnished_room(), Accuracy()
     sensor = SimulatedSensor(world, SensorNoise(sigma_range, 0.001))
-    settings = ExtractionSettings(fitter=fitter, noise=sensor.noise)
+    settings = ExtractionSettings(noise=sensor.noise)
     for _ in range(scans):
         pose = random_pose(world, rng)
         scan, hit = sensor.scan(pose, rng)
@@ -101,25 +100,23 @@ def _count(
             result.corner_errors.append(float(distances.min()))
 
 
-def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> NDArray[np.bool_]:
+def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> Bools:
     """(M, W) true where both ends of a segment are within tolerance of a wall, and its middle is on it."""
     origin, along = walls[:, 0], walls[:, 1] - walls[:, 0]
     length = np.linalg.norm(along, axis=1)
     tangent = along / length[:, None]
-    normal = np.stack([-tangent[:, 1], tangent[:, 0]], 1)
+    normal = left_of(tangent)
     across = [np.abs(((p[:, None] - origin) * normal).sum(-1)) for p in (start, end)]
     middle = (((start + end)[:, None] / 2 - origin) * tangent).sum(-1)
-    near: NDArray[np.bool_] = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
+    near: Bools = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
     return near
 
 
-def _covered_beams(segments: Segments, beams: int) -> NDArray[np.bool_]:
+def _covered_beams(segments: Segments, beams: int) -> Bools:
     """(M, N) true where a segment covers a beam."""
     first, last = segments.first_beam[:, None], segments.last_beam[:, None]
     k = np.arange(beams)
-    inside: NDArray[np.bool_] = np.where(
-        first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last)
-    )
+    inside: Bools = np.where(first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last))
     return inside
 
 
@@ -138,7 +135,7 @@ def _views(walls: Array, hit: Ints, bearings: Array) -> list[_View]:
 def _extent(wall: Array, bearings: Array) -> float:
     """Length (m) of the part of a wall between beams at these bearings."""
     tangent = (wall[1] - wall[0]) / np.linalg.norm(wall[1] - wall[0])
-    normal = np.array([-tangent[1], tangent[0]])
+    normal = left_of(tangent)
     u = unit_vectors(bearings)
     return float(np.ptp((wall[0] @ normal) / (u @ normal) * (u @ tangent)))
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import stdtrit
 
-from lidarcore.scan import Array
+from lidarcore.arrays import Array
 
 LEVEL = 0.95
 _Z = 1.959964  # of a normal, two-sided at LEVEL
@@ -33,6 +33,10 @@ class Interval:
         """'1.23 ± 0.04' of an interval around its value, or the value alone if its error is not known."""
         value = f"{factor * self.value:.{digits}f}".replace("-", "−")
         return f"{value} ± {factor * self.half_width:.{digits}f}" if np.isfinite(self.half_width) else value
+
+    def span(self, digits: int) -> str:
+        """'1.23 (1.19–1.26)': the value and the ends of its interval."""
+        return f"{self.value:.{digits}f} ({self.low:.{digits}f}–{self.high:.{digits}f})"
 
     def root(self) -> "Interval":
         """The interval of the square root; an end below 0, which chance can make, becomes 0."""

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import ndtri
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.intervals import LEVEL, Interval
 from lidarcore.reporting import NOT_COMPARABLE, Agreement
-from lidarcore.scan import Array
 
 Claim = tuple[str, str, Agreement]
 """What the paper says, what was measured, and whether that agrees; None where what was measured leaves it open."""

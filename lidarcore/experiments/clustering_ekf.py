@@ -14,13 +14,14 @@ from itertools import islice, pairwise
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.clusters import CLUSTERERS, Clusters, ClusterSettings, cluster
 from lidarcore.evaluation.workers import run_all
 from lidarcore.experiments.tracks import Errors, Track, dead_reckoned, errors, filtered
 from lidarcore.geometry import relative
 from lidarcore.localization import LocalizationSettings, OdometryNoise, deskew
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 from lidarcore.simulation.posts import scattered
 from lidarcore.simulation.robot import RATE, SimulatedRobot
 from lidarcore.simulation.settings import OdometryError, SimulationSettings

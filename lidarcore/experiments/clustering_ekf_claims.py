@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.clusters import CLUSTERERS
 from lidarcore.evaluation.intervals import Interval, mean
 from lidarcore.experiments.clustering_ekf import METHODS, ClusteringStudy
-from lidarcore.scan import Array
 
 Claim = tuple[str, str, bool | None]
 """What the paper says, what was measured, and whether that agrees; None where the runs leave it open."""

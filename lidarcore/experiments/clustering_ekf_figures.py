@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lidarcore import reporting
+from lidarcore.arrays import Array
 from lidarcore.clusters import CLUSTERERS
 from lidarcore.evaluation.intervals import Interval, mean
 from lidarcore.experiments.clustering_ekf import (
@@ -20,7 +21,6 @@ from lidarcore.experiments.clustering_ekf import (
 from lidarcore.experiments.tracks import Track
 from lidarcore.geometry import act, unit_vectors
 from lidarcore.reporting import Bar, Map, bars, chart
-from lidarcore.scan import Array
 
 NAMES = tuple(CLUSTERERS[name].title for name in METHODS)
 WORDS = {"without": "without EKF", "with": "with EKF", "lost": "with EKF, objects lost"}

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.consistency.trials import Segmentation, Trials, simulate
@@ -16,7 +16,7 @@ from lidarcore.extraction import compare
 from lidarcore.features import Corners
 from lidarcore.geometry import contains
 from lidarcore.lines import FITTERS
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 from lidarcore.settings import Covariance, ExtractionSettings
 
 LEAST_SCANS = 10
@@ -85,9 +85,9 @@ class CornerStudy:
         return medians
 
     @cached_property
-    def _with_corners(self) -> NDArray[np.bool_]:
+    def _with_corners(self) -> Bools:
         found = [np.isfinite(trials.errors[..., 0]).any(0) for trials in self.trials.values()]
-        every: NDArray[np.bool_] = np.all(found, axis=0)
+        every: Bools = np.all(found, axis=0)
         return every
 
     def scattered(self, fitter: str) -> Array:

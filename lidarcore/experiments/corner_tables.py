@@ -5,22 +5,22 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from lidarcore import reporting
+from lidarcore.arrays import Array
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.experiments.corner_study import CornerStudy
 from lidarcore.experiments.environments import Environment
 from lidarcore.lines import FITTERS
 from lidarcore.reporting import Map, chart
-from lidarcore.scan import Array
+from lidarcore.reporting.charts import SIGMAS_95
 
 SCALE = 10  # of the ellipses in maps, as in [WCTLS, Fig. 3]
-_OF_95 = 2.4477  # sigmas of the ellipses that maps draw
 _MARGIN = 0.6  # m
 
 
-def sigmas(environment: Environment, fitters: Sequence[str], caption: str) -> str:
+def sigmas(environment: Environment, fitters: Sequence[str], number: str) -> str:
     """The paper's table of standard deviations, with the true scatter and the least possible beside them, mm."""
-    study = environment.study
+    study, what = environment.study, f"Table {number}. " if environment.room else ""
     columns: dict[str, Array] = {}
     for name in fitters:
         title = _short(name)
@@ -36,11 +36,13 @@ def sigmas(environment: Environment, fitters: Sequence[str], caption: str) -> st
         [number, *(f"{value:.1f}" for value in row)]
         for number, row in zip([*numbers, "mean"], [*values, values.mean(axis=0)], strict=True)
     ]
+    caption = f"{what}Standard deviations of the corners of {environment.name}, mm"
     return reporting.table(caption, headers, rows)
 
 
-def honesty(environment: Environment, fitters: Sequence[str], caption: str) -> str:
-    """Coverage and errors of every fitter, with segments known and with those that are found."""
+def honesty(environment: Environment, fitters: Sequence[str]) -> str:
+    """Coverage and errors of every fitter, and of ml in a room, with segments known and with those that are found."""
+    fitters = (*fitters, *(("ml",) if environment.room else ()))
     studies: list[tuple[str, CornerStudy]] = [("known" if environment.found else "found", environment.study)]
     if environment.found is not None:
         studies.append(("found", environment.found))
@@ -63,11 +65,21 @@ def honesty(environment: Environment, fitters: Sequence[str], caption: str) -> s
         "in the published 95 % ellipse, %", "in the consistent one, %",
         "published area, mm²", "consistent area, mm²", "true area, mm²",
     )  # fmt: skip
+    caption = f"Coverage, errors and median ellipse areas, {environment.name}"
     return reporting.table(caption, headers, rows, texts=2)
 
 
-def maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Two panels: ellipses as published and as they truly are, ten times as large; classes by fitter."""
+def maps(environment: Environment, styles: Mapping[str, str], number: str = "", remark: str = "") -> str:
+    """A figure of two panels: ellipses as published and as they truly are, SCALE times as large; classes by fitter."""
+    name = environment.name[0].upper() + environment.name[1:]
+    caption = (
+        f"{number}{name}. One-sigma ellipses, drawn {SCALE} times as large{remark}; the green dot is the sensor, "
+        "corners are numbered clockwise."
+    )
+    return reporting.figure(caption, _maps(environment, styles), legend(styles))
+
+
+def _maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str, str]]:
     study = environment.study
     points, corners = environment.points, study.corners
     low, high = points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN
@@ -81,7 +93,7 @@ def maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str,
         drawn = Map(
             title, (low[0], high[0], low[1], high[1]), np.empty((0, 2)), 0.0, [],
             [("scan", points), ("seen", np.zeros((1, 2)))],
-            [(style, corners, (SCALE / _OF_95) ** 2 * of(name)) for name, style in styles.items()],
+            [(style, corners, (SCALE / SIGMAS_95) ** 2 * of(name)) for name, style in styles.items()],
             texts=numbers, texts_at=_aside(corners),
         )  # fmt: skip
         panels.append((title, chart(drawn, 560)))
@@ -94,9 +106,9 @@ def _aside(corners: Array) -> Array:
     return away
 
 
-def heading(environment: Environment) -> str:
-    """The name of an environment, as at the beginning of a sentence."""
-    return environment.name[0].upper() + environment.name[1:]
+def methods(fitters: Sequence[str]) -> str:
+    """What the fitters are, and where they are from."""
+    return f"Methods: {'; '.join(f'{FITTERS[name].title}: {FITTERS[name].reference}' for name in fitters)}."
 
 
 def legend(styles: Mapping[str, str]) -> list[tuple[str, str]]:

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.experiments.claim_rules import (
     NOISE_ASSUMED,
@@ -21,7 +22,6 @@ from lidarcore.experiments.cwlf import COMPARED, MEASUREMENTS, CwlfStudy
 from lidarcore.experiments.cwlf_steps import STEPS
 from lidarcore.experiments.environments import Environment
 from lidarcore.experiments.paper_rooms import CWLF_ROOMS
-from lidarcore.scan import Array
 
 MEANS = ((33.68, 27.98, 23.02, 18.27), (25.32, 27.12, 25.86, 13.92))
 """mm, last rows of tables I and II: Arras-Siegwart x, y, CWLF x, y."""

@@ -4,13 +4,12 @@ import numpy as np
 
 from lidarcore import reporting
 from lidarcore.experiments.corner_study import CornerStudy
-from lidarcore.experiments.corner_tables import SCALE, heading, honesty, legend, maps, sigmas
+from lidarcore.experiments.corner_tables import honesty, legend, maps, methods, sigmas
 from lidarcore.experiments.cwlf import COMPARED, FITTERS, MEASUREMENTS, CwlfStudy
 from lidarcore.experiments.cwlf_claims import claims
 from lidarcore.experiments.cwlf_steps import STEPS
-from lidarcore.experiments.environments import Environment, of_verdicts, set_up
+from lidarcore.experiments.environments import of_verdicts, set_up
 from lidarcore.experiments.paper_rooms import CWLF_ROOMS
-from lidarcore.lines import FITTERS as ALL
 from lidarcore.reporting import Bar, bars, curves
 
 TITLE = "Corners by conditional weighted linear fitting, and by Arras and Siegwart"
@@ -34,6 +33,7 @@ def html(result: CwlfStudy) -> str:
         "Indoor SLAM” (IEEE Transactions on Industrial Informatics 20(7), 2024), run again. Beside what each method "
         "claims of its corners stands how they truly scatter. Brackets give 95 % confidence intervals."
     )
+    chosen = [_CHOSEN] if result.times else []
     sections = [
         (
             "What the paper says and what came out",
@@ -41,14 +41,14 @@ def html(result: CwlfStudy) -> str:
         ),
         (
             "Uncertainty of every corner (tables I and II)",
-            "".join(map(_table, ("I", "II"), result.environments)),
+            "".join(sigmas(e, FITTERS, n) for e, n in zip(result.environments, ("I", "II"), strict=False)),
         ),
-        ("Where the corners are (figure 2)", "".join(map(_figure2, result.environments))),
-        ("Can the ellipses be believed?", "".join(map(_honesty, result.environments))),
+        ("Where the corners are (figure 2)", "".join(maps(e, STYLES) for e in result.environments)),
+        ("Can the ellipses be believed?", "".join(honesty(e, FITTERS) for e in result.environments)),
         *(_of_chosen_corners(result) if result.times else []),
         (
             "How this was made",
-            reporting.bullets([*set_up(result.design, result.environments), *_methods(result)]),
+            reporting.bullets([*set_up(result.design, result.environments), *chosen, methods(FITTERS)]),
         ),
     ]
     return reporting.page(TITLE, lead, sections)
@@ -95,25 +95,6 @@ def _of_errors(studies: list[CornerStudy]) -> list[str]:
         "too, hold fewer than 95 % with noise of 5 cm. The last row of the table, maximum likelihood on the ranges, "
         "shows what the same scans allow."
     ]
-
-
-def _table(number: str, environment: Environment) -> str:
-    what = f"Table {number}. " if environment.room else ""
-    caption = f"{what}Standard deviations of the corners of {environment.name}, mm"
-    return sigmas(environment, FITTERS, caption)
-
-
-def _figure2(environment: Environment) -> str:
-    caption = (
-        f"{heading(environment)}. One-sigma ellipses, drawn {SCALE} times as large; the green dot is the "
-        "sensor, corners are numbered clockwise."
-    )
-    return reporting.figure(caption, maps(environment, STYLES), legend(STYLES))
-
-
-def _honesty(environment: Environment) -> str:
-    fitters = (*FITTERS, *(("ml",) if environment.room else ()))
-    return honesty(environment, fitters, f"Coverage, errors and median ellipse areas, {environment.name}")
 
 
 def _figure3(result: CwlfStudy) -> str:
@@ -220,8 +201,3 @@ def _step_bars(result: CwlfStudy, room: str) -> tuple[str, str]:
                 label = step.replace("covariance of the ", "cov. of ")
                 rows.append(Bar(label, time, time, np.nan, f"{time:.1f}", STYLES[name]))
     return "time of the steps, µs", bars(rows, most, least=least, title=f"Time of the four steps, {room}")
-
-
-def _methods(result: CwlfStudy) -> list[str]:
-    methods = f"Methods: {'; '.join(f'{ALL[name].title}: {ALL[name].reference}' for name in FITTERS)}."
-    return [_CHOSEN, methods] if result.times else [methods]

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import unit_vectors
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 
 Beams = tuple[Array, Array]
 """Ranges (N,) m and bearings (N,) rad of one wall, sensor frame."""

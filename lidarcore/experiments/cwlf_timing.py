@@ -7,13 +7,13 @@ from functools import partial
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.corners import intersect
 from lidarcore.evaluation.consistency.cramer_rao import corner_bound
 from lidarcore.experiments.cwlf_steps import METHODS, Beams, corner
 from lidarcore.experiments.paper_rooms import Room
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, fit_beams
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 from lidarcore.tables import CORNER_FIELDS
 
 

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.consistency.trials import SEGMENTATIONS, Segmentation
 from lidarcore.evaluation.workers import run_all
 from lidarcore.experiments.claim_rules import RULES
@@ -13,7 +14,7 @@ from lidarcore.experiments.corner_study import CornerStudy, recorded, simulated
 from lidarcore.experiments.paper_rooms import BEAMS, NOISE, Room
 from lidarcore.geometry import unit_vectors
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
 QUICK_SCANS = 100

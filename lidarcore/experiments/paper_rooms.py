@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.repeatability.places import Place, look, shared_ends
+from lidarcore.geometry import left_of
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 from lidarcore.simulation.rooms import box, polygon
 from lidarcore.simulation.world import World
 
@@ -55,7 +56,7 @@ def _outline(vertices: ArrayLike, recesses: Mapping[int, Sequence[Recess]]) -> A
     points = []
     for side, (a, b) in enumerate(zip(corners, np.roll(corners, -1, axis=0), strict=True)):
         along = (b - a) / np.linalg.norm(b - a)
-        inward = np.array([-along[1], along[0]])
+        inward = left_of(along)
         points.append(a)
         for at, width, depth in recesses.get(side, ()):
             near, far = a + at * along, a + (at + width) * along

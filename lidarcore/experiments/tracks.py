@@ -7,6 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.clusters import Clusters
 from lidarcore.geometry import (
     UncertainPose,
@@ -18,7 +19,7 @@ from lidarcore.geometry import (
 )
 from lidarcore.localization import LocalizationSettings, OdometryNoise, Points
 from lidarcore.localization.ekf.slam import Slam
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 from lidarcore.simulation.paths import Path
 
 START = np.diag([1e-3, 1e-3, 1e-3]) ** 2

@@ -4,8 +4,8 @@ import numpy as np
 
 from lidarcore import reporting
 from lidarcore.evaluation.consistency.design import KINDS
-from lidarcore.experiments.corner_tables import SCALE, heading, honesty, legend, maps, sigmas
-from lidarcore.experiments.environments import Environment, of_verdicts, set_up
+from lidarcore.experiments.corner_tables import honesty, legend, maps, methods, sigmas
+from lidarcore.experiments.environments import of_verdicts, set_up
 from lidarcore.experiments.wctls import FITTERS, WctlsStudy
 from lidarcore.experiments.wctls_claims import AREAS, claims
 from lidarcore.lines import FITTERS as ALL
@@ -30,16 +30,27 @@ def html(result: WctlsStudy) -> str:
         "again. Beside what each method claims of its corners stands how they truly scatter. Brackets give 95 % "
         "confidence intervals."
     )
+    tables = (sigmas(e, FITTERS, n) for e, n in zip(result.environments, "12", strict=False))
+    figures = (maps(e, STYLES, "Figure 3. ", ", as in the paper") for e in result.environments)
     sections = [
         (
             "What the paper says and what came out",
             reporting.verdicts(claims(result)) + reporting.paragraphs(*_why(result)),
         ),
-        ("Uncertainty of every corner (tables 1 and 2)", "".join(map(_table, (1, 2), result.environments))),
-        ("The ellipses (figure 3)", "".join(map(_figure3, result.environments))),
+        (
+            "Uncertainty of every corner (tables 1 and 2)",
+            "".join(tables),
+        ),
+        (
+            "The ellipses (figure 3)",
+            "".join(figures),
+        ),
         ("Median ellipse area of each scan (figure 4)", _figure4(result)),
-        ("Can the ellipses be believed?", "".join(map(_honesty, result.environments))),
-        ("How this was made", reporting.bullets([*set_up(result.design, result.environments), *_methods()])),
+        ("Can the ellipses be believed?", "".join(honesty(e, FITTERS) for e in result.environments)),
+        (
+            "How this was made",
+            reporting.bullets([*set_up(result.design, result.environments), methods(FITTERS)]),
+        ),
     ]
     return reporting.page(TITLE, lead, sections)
 
@@ -65,19 +76,6 @@ def _why(result: WctlsStudy) -> list[str]:
         "parameters its lines are written in; propagated in full (“consistent”) the two agree to the last digit.",
         *(_OF_ROOMS if known else ()),
     ]
-
-
-def _table(number: int, environment: Environment) -> str:
-    what = f"Table {number}. " if environment.room else ""
-    return sigmas(environment, FITTERS, f"{what}Standard deviations of the corners of {environment.name}, mm")
-
-
-def _figure3(environment: Environment) -> str:
-    caption = (
-        f"Figure 3. {heading(environment)}. One-sigma ellipses, drawn {SCALE} times as large, as in the paper; "
-        "the green dot is the sensor, corners are numbered clockwise."
-    )
-    return reporting.figure(caption, maps(environment, STYLES), legend(STYLES))
 
 
 def _figure4(result: WctlsStudy) -> str:
@@ -109,12 +107,3 @@ def _figure4(result: WctlsStudy) -> str:
         "Median ellipse area per scan ± standard deviation over scans, mm²", headers, rows, texts=2
     )
     return reporting.figure(caption, panels, legend(STYLES)) + table
-
-
-def _honesty(environment: Environment) -> str:
-    fitters = (*FITTERS, *(("ml",) if environment.room else ()))
-    return honesty(environment, fitters, f"Coverage, errors and median ellipse areas, {environment.name}")
-
-
-def _methods() -> list[str]:
-    return ["Methods: " + "; ".join(f"{ALL[name].title}: {ALL[name].reference}" for name in FITTERS) + "."]

@@ -3,9 +3,9 @@
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from lidarcore.arrays import Array, Numbers
+from lidarcore.arrays import Array, Bools, Numbers
 from lidarcore.errors import CovarianceError
 from lidarcore.geometry.se2 import unit_vectors
 
@@ -38,7 +38,7 @@ def chi_square_gate(probability: float, dimensions: int = 2) -> float:
     return float(chdtri(dimensions, 1 - probability))
 
 
-def contains(difference: Array, covariance: Array, probability: float) -> NDArray[np.bool_]:
+def contains(difference: Array, covariance: Array, probability: float) -> Bools:
     """(...,) true where a difference (..., n) lies in the ellipse that holds this share of its Gaussian."""
     gate = chi_square_gate(probability, difference.shape[-1])
     return np.asarray(squared_mahalanobis(difference, covariance) <= gate)
@@ -59,12 +59,6 @@ def ellipse_axes(covariance: Array, sigmas: float = 1.0) -> tuple[Array, Array]:
     """
     variances, directions = np.linalg.eigh(covariance)
     return sigmas * np.sqrt(np.maximum(variances, 0.0)), directions
-
-
-def ellipse_area(covariance: Array, sigmas: float = 1.0) -> Array:
-    """Area (...,) m² of the ellipses of covariances (..., 2, 2) m² at this Mahalanobis distance."""
-    area: Array = np.pi * sigmas**2 * np.sqrt(np.maximum(np.linalg.det(covariance), 0.0))
-    return area
 
 
 def ellipse_outline(xy: Array, covariance: Array, sigmas: float, points: int) -> Array:

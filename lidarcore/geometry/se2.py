@@ -84,15 +84,6 @@ def compose_jacobians(T_a_b: Array, T_b_c: Array) -> tuple[Array, Array]:
     return by_first, by_second
 
 
-def inverse_jacobian(T_a_b: Array) -> Array:
-    """Jacobian (..., 3, 3) of `inverse`."""
-    T_b_a = inverse(T_a_b)
-    J = -_eye(T_b_a)
-    J[..., :2, :2] = -rotation(T_b_a[..., 2])
-    J[..., :2, 2] = -left_of(T_b_a[..., :2])
-    return J
-
-
 def relative_jacobians(T_a_b: Array, T_a_c: Array) -> tuple[Array, Array]:
     """Jacobians (..., 3, 3) of `relative` by its first and its second pose."""
     T_b_c = relative(T_a_b, T_a_c)

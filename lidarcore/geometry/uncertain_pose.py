@@ -12,8 +12,6 @@ from lidarcore.geometry.kernels import compose_with_covariance, relative_with_co
 from lidarcore.geometry.se2 import (
     compose,
     compose_jacobians,
-    inverse,
-    inverse_jacobian,
     pose_difference,
     relative,
     relative_jacobians,
@@ -37,10 +35,6 @@ class UncertainPose(NamedTuple):
         F, G = compose_jacobians(self.pose, T_b_c.pose)
         covariance = _carried(F, self.covariance) + _carried(G, T_b_c.covariance)
         return UncertainPose(compose(self.pose, T_b_c.pose), covariance)
-
-    def inverse(self) -> "UncertainPose":
-        """T_b_a."""
-        return UncertainPose(inverse(self.pose), _carried(inverse_jacobian(self.pose), self.covariance))
 
     def intersect(self, other: "UncertainPose") -> "UncertainPose":
         """One estimate from two of the same pose, however their errors depend on each other.

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.errors import LandmarkError
 from lidarcore.geometry import largest_variance
-from lidarcore.scan import Array
 
 MAX_COORDINATE = 1e7  # m; farther than across a continent is surely another unit
 MAX_TIME = 1e12  # s; that many are surely another unit

@@ -9,7 +9,6 @@ from lidarcore.localization.ekf.slam import Slam
 from lidarcore.localization.landmarks import Landmarks, from_stored, to_stored
 from lidarcore.localization.navigator import Navigator
 from lidarcore.localization.points import Points
-from lidarcore.localization.posts import find_posts
 from lidarcore.localization.precompile import warm_up
 from lidarcore.localization.relocalization import Relocation, relocalize
 from lidarcore.localization.settings import (
@@ -37,7 +36,6 @@ __all__ = [
     "VelocityNoise",
     "as_pose",
     "deskew",
-    "find_posts",
     "from_stored",
     "relocalize",
     "to_stored",

@@ -7,11 +7,11 @@ from typing import Literal
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
 from lidarcore.geometry import compose, relative
 from lidarcore.localization.ekf.estimate import Instant
 from lidarcore.localization.settings import LocalizationSettings
-from lidarcore.scan import Array
 
 _AGREEING = (
     3  # scans in a row that have to agree before a new clock or odometry, or that there is none, is believed

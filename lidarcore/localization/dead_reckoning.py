@@ -1,8 +1,9 @@
 """What odometry alone says: where the sensor would be, and how it moves."""
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import compose, relative
 from lidarcore.localization.ekf.estimate import Instant
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 _LONG = 1.0  # s, over which an increment does not tell the velocity at its end
 Velocity = tuple[float, float, float]  # m/s ahead, rad/s, m/s to the left

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.errors import LocalizationError
 from lidarcore.geometry import rotation
 from lidarcore.geometry.kernels import wrap
 from lidarcore.localization.dead_reckoning import Velocity
 from lidarcore.localization.points import Points
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 
 class Distortion:

@@ -7,10 +7,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import LocalizationError
 from lidarcore.landmarks.landmark import Landmark
 from lidarcore.localization.points import Points
-from lidarcore.scan import Array, Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class Landmarks:
 
     ids: Ints
     points: Points
-    confirmed: NDArray[np.bool_]
+    confirmed: Bools
     counts: Ints
     first_seen: Array
     last_seen: Array
@@ -57,7 +57,7 @@ class Landmarks:
             np.arange(L), points, np.ones(L, np.bool_), np.zeros(L, np.int64), np.zeros(L), np.zeros(L)
         )
 
-    def subset(self, which: NDArray[np.bool_]) -> Self:
+    def subset(self, which: Bools) -> Self:
         """The landmarks of which (L,) is true."""
         columns = {name: getattr(self, name)[which] for name in _COLUMNS}
         return type(self)(points=self.points.subset(which), **columns)

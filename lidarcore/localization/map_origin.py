@@ -4,10 +4,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import act_inverse, act_jacobians
 from lidarcore.localization.ekf.estimate import Estimate
 from lidarcore.localization.landmarks import Landmarks
-from lidarcore.scan import Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)

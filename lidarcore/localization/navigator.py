@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError, LostError, MotionError
 from lidarcore.features import Features
@@ -31,7 +32,7 @@ from lidarcore.localization.tracking_result import (
     left_out,
 )
 from lidarcore.localization.visibility import Visibility
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 _ORIGIN = 1e-6 * np.eye(3)
 _NOWHERE = np.diag([10.0, 10.0, np.pi]) ** 2  # m², m², rad²: covariance of a pose of which nothing is known

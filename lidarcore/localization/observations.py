@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import block_diag
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError
 from lidarcore.features import Features
@@ -18,7 +19,7 @@ from lidarcore.localization.ekf.association import Association
 from lidarcore.localization.ekf.estimate import Innovation
 from lidarcore.localization.points import Points, widths
 from lidarcore.localization.settings import NavigationSettings
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,11 +7,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError
 from lidarcore.features import Corners
 from lidarcore.geometry import check_covariance, largest_variance
-from lidarcore.scan import Array, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +65,7 @@ class Points:
     def __len__(self) -> int:
         return len(self.xy)
 
-    def subset(self, which: NDArray[np.bool_] | Ints) -> Self:
+    def subset(self, which: Bools | Ints) -> Self:
         """The points of which (K,) is true, or with these indices."""
         return self.with_new(self.xy[which], self.covariance[which], np.asarray(self.kinds)[which])
 

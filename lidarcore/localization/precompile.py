@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.extraction import extract
 from lidarcore.localization.navigator import Navigator
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import NavigationSettings
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 _SCANS, _PERIOD = 8, 0.5  # enough, and long enough, that landmarks are confirmed
 

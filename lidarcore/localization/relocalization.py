@@ -7,9 +7,9 @@ Two observed points and two landmarks equally far apart fix a pose; the pose tha
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import LostError
 from lidarcore.geometry import (
     act,
@@ -20,10 +20,10 @@ from lidarcore.geometry import (
     wrap,
 )
 from lidarcore.localization.points import Points
-from lidarcore.scan import Array, Ints
 
 _FAR = 6.0  # standard deviations; what is known of a pose after a gap is rough
 _SIGMAS = 4.0
+_NEEDED = 4  # pairs at least
 _PAIRS = 12  # observed pairs to try, the longest ones: they fix the heading best
 _SAME = np.array([0.3, 0.3, 0.2])  # m, m, rad: poses nearer than this are one
 _ROUNDS = 4
@@ -42,18 +42,16 @@ class Relocation:
     pairs: Ints
 
 
-def relocalize(
-    observed: Points, landmarks: Points, min_pairs: int = 4, near: tuple[Array, Array] | None = None
-) -> Relocation:
-    """Find the one pose from which the landmarks of the map explain min_pairs of the points seen, and half of them.
+def relocalize(observed: Points, landmarks: Points, near: tuple[Array, Array] | None = None) -> Relocation:
+    """Find the one pose from which the landmarks of the map explain four of the points seen, and half of them.
 
     near, if given, are a pose (3,) and a covariance (3, 3): only poses within some of its standard deviations count.
     Raises LostError if there is none, or several explain as much: a symmetric room, or too few points; or if the map
     is too large to be searched.
     """
     found: list[Relocation] = []
-    _check(observed, landmarks, min_pairs)
-    min_pairs, refined = max(min_pairs, (len(observed) + 1) // 2), 0
+    _check(observed, landmarks, _NEEDED)
+    min_pairs, refined = max(_NEEDED, (len(observed) + 1) // 2), 0
     if min(len(observed), len(landmarks)) < min_pairs:
         raise _unexplained(min_pairs, observed)
     tree = cKDTree(landmarks.xy)
@@ -84,7 +82,7 @@ def relocalize(
     return found[0]
 
 
-def _are_near(poses: Array, pose: Array, covariance: Array) -> NDArray[np.bool_]:
+def _are_near(poses: Array, pose: Array, covariance: Array) -> Bools:
     """(H,) true for the poses within _FAR standard deviations of a pose."""
     return np.asarray(squared_mahalanobis(pose_difference(poses, pose), covariance) < _FAR**2)
 
@@ -156,9 +154,7 @@ def _counts(poses: Array, observed: Points, landmarks: Points, tree: cKDTree) ->
     return counts
 
 
-def _nearest(
-    placed: Array, observed: Points, landmarks: Points, tree: cKDTree
-) -> tuple[Ints, NDArray[np.bool_]]:
+def _nearest(placed: Array, observed: Points, landmarks: Points, tree: cKDTree) -> tuple[Ints, Bools]:
     """The nearest landmark (..., K) of points placed (..., K, 2) m in the world, and whether it is close enough."""
     distance, nearest = tree.query(placed)
     reach = np.sqrt(

@@ -4,88 +4,71 @@ from dataclasses import field
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, model_validator
 
-from lidarcore.fields import number
+from lidarcore.arrays import Array
+from lidarcore.fields import number, settings
 from lidarcore.localization.ekf.kernels import odometry_variances
-from lidarcore.scan import Array
-
-_CONFIG = ConfigDict(extra="forbid")
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class OdometryNoise:
     """Random walk of odometry: variances grow with the way and the turn, however finely they are cut into steps."""
 
-    along: Annotated[
-        float,
-        number(
-            1e-4,
-            1,
-            "m/√m",
-            "standard deviation ahead after one metre. "
-            "More: scans correct the distance that odometry reports by more",
-        ),
-    ] = 0.03
-    across: Annotated[
-        float,
-        number(
-            1e-4,
-            1,
-            "m/√m",
-            "standard deviation sideways after one metre. More: scans correct sideways slip by more",
-        ),
-    ] = 0.01
-    heading_per_metre: Annotated[
-        float,
-        number(
-            1e-4,
-            1,
-            "rad/√m",
-            "standard deviation of the heading after one metre. "
-            "More: scans correct the heading on straight stretches by more",
-        ),
-    ] = 0.02
-    heading_per_radian: Annotated[
-        float,
-        number(
-            1e-4,
-            1,
-            "rad/√rad",
-            "standard deviation of the heading after turning one radian. More: scans correct turns by more",
-        ),
-    ] = 0.05
-    slip_per_radian: Annotated[
-        float,
-        number(
-            0,
-            1,
-            "m/√rad",
-            "standard deviation of the position after turning one radian. "
-            "More: scans correct the position after turns by more",
-        ),
-    ] = 0.01
-    unseen: Annotated[
-        float,
-        number(
-            0,
-            1,
-            "m/√s",
-            "drift of the position per root second that odometry does not report. "
-            "More: the position grows vague sooner at rest",
-        ),
-    ] = 0.002
-    unseen_turn: Annotated[
-        float,
-        number(
-            0,
-            1,
-            "rad/√s",
-            "drift of the heading per root second that odometry does not report. "
-            "More: the heading grows vague sooner at rest",
-        ),
-    ] = 0.002
+    along: float = number(
+        1e-4,
+        1,
+        "m/√m",
+        "standard deviation ahead after one metre. "
+        "More: scans correct the distance that odometry reports by more",
+        default=0.03,
+    )
+    across: float = number(
+        1e-4,
+        1,
+        "m/√m",
+        "standard deviation sideways after one metre. More: scans correct sideways slip by more",
+        default=0.01,
+    )
+    heading_per_metre: float = number(
+        1e-4,
+        1,
+        "rad/√m",
+        "standard deviation of the heading after one metre. "
+        "More: scans correct the heading on straight stretches by more",
+        default=0.02,
+    )
+    heading_per_radian: float = number(
+        1e-4,
+        1,
+        "rad/√rad",
+        "standard deviation of the heading after turning one radian. More: scans correct turns by more",
+        default=0.05,
+    )
+    slip_per_radian: float = number(
+        0,
+        1,
+        "m/√rad",
+        "standard deviation of the position after turning one radian. "
+        "More: scans correct the position after turns by more",
+        default=0.01,
+    )
+    unseen: float = number(
+        0,
+        1,
+        "m/√s",
+        "drift of the position per root second that odometry does not report. "
+        "More: the position grows vague sooner at rest",
+        default=0.002,
+    )
+    unseen_turn: float = number(
+        0,
+        1,
+        "rad/√s",
+        "drift of the heading per root second that odometry does not report. "
+        "More: the heading grows vague sooner at rest",
+        default=0.002,
+    )
 
     @property
     def table(self) -> Array:
@@ -104,60 +87,50 @@ class OdometryNoise:
         return np.diag(odometry_variances(np.asarray(increment, np.float64), dt, self.table))
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class VelocityNoise:
     """White accelerations of the constant-velocity model."""
 
-    acceleration: Annotated[
-        float,
-        number(
-            1e-4,
-            50,
-            "m/s/√s",
-            "change of the speed within a second. "
-            "More: faster starts and stops are followed, and the pose is vaguer between scans",
-        ),
-    ] = 0.5
-    sideways: Annotated[
-        float,
-        number(
-            0,
-            50,
-            "m/s/√s",
-            "change of the speed sideways within a second; 0 if it never slides. More: it may slide faster",
-        ),
-    ] = 0.5
-    turn_acceleration: Annotated[
-        float,
-        number(
-            1e-4,
-            50,
-            "rad/s/√s",
-            "change of the turn rate within a second. "
-            "More: faster turns are followed, and the heading is vaguer between scans",
-        ),
-    ] = 1.0
-    speed: Annotated[
-        float,
-        number(
-            1e-3,
-            50,
-            "m/s",
-            "standard deviation of the speed at the start. More: a start in motion is followed",
-        ),
-    ] = 1.0
-    turn_rate: Annotated[
-        float,
-        number(
-            1e-3,
-            50,
-            "rad/s",
-            "standard deviation of the turn rate at the start. More: a start in a turn is followed",
-        ),
-    ] = 1.0
+    acceleration: float = number(
+        1e-4,
+        50,
+        "m/s/√s",
+        "change of the speed within a second. "
+        "More: faster starts and stops are followed, and the pose is vaguer between scans",
+        default=0.5,
+    )
+    sideways: float = number(
+        0,
+        50,
+        "m/s/√s",
+        "change of the speed sideways within a second; 0 if it never slides. More: it may slide faster",
+        default=0.5,
+    )
+    turn_acceleration: float = number(
+        1e-4,
+        50,
+        "rad/s/√s",
+        "change of the turn rate within a second. "
+        "More: faster turns are followed, and the heading is vaguer between scans",
+        default=1.0,
+    )
+    speed: float = number(
+        1e-3,
+        50,
+        "m/s",
+        "standard deviation of the speed at the start. More: a start in motion is followed",
+        default=1.0,
+    )
+    turn_rate: float = number(
+        1e-3,
+        50,
+        "rad/s",
+        "standard deviation of the turn rate at the start. More: a start in a turn is followed",
+        default=1.0,
+    )
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class LocalizationSettings:
     """How the filter moves, matches and keeps landmarks. Immutable; pydantic.ValidationError names a wrong field."""
 
@@ -166,44 +139,40 @@ class LocalizationSettings:
     ] = "odometry"
     odometry: OdometryNoise = field(default_factory=OdometryNoise)
     velocity: VelocityNoise = field(default_factory=VelocityNoise)
-    max_speed: Annotated[
-        float,
-        number(0.01, 100, "m/s", "odometry that is faster has jumped. More: wilder odometry is believed"),
-    ] = 3.0
-    max_turn_rate: Annotated[
-        float,
-        number(0.01, 100, "rad/s", "odometry that turns faster has jumped. More: wilder turns are believed"),
-    ] = 6.0
-    gate: Annotated[
-        float,
-        number(
-            0.5,
-            0.9999,
-            "",
-            "share of the true pairs that the chi-square gate lets through. "
-            "More: fewer true pairs are lost, more wrong ones are taken",
-        ),
-    ] = 0.99
-    new_gate: Annotated[
-        float,
-        number(
-            0.9,
-            0.999999999,
-            "",
-            "a new landmark lies outside this gate of every known one. "
-            "More: fewer landmarks are mapped twice, and fewer of those that are close together at all",
-        ),
-    ] = 0.99999
-    ambiguity: Annotated[
-        float,
-        number(
-            1,
-            1e3,
-            "",
-            "a pair is ambiguous if it is not this many times likelier than another. "
-            "More: fewer wrong pairs, more that are left out",
-        ),
-    ] = 10.0
+    max_speed: float = number(
+        0.01, 100, "m/s", "odometry that is faster has jumped. More: wilder odometry is believed", default=3.0
+    )
+    max_turn_rate: float = number(
+        0.01,
+        100,
+        "rad/s",
+        "odometry that turns faster has jumped. More: wilder turns are believed",
+        default=6.0,
+    )
+    gate: float = number(
+        0.5,
+        0.9999,
+        "",
+        "share of the true pairs that the chi-square gate lets through. "
+        "More: fewer true pairs are lost, more wrong ones are taken",
+        default=0.99,
+    )
+    new_gate: float = number(
+        0.9,
+        0.999999999,
+        "",
+        "a new landmark lies outside this gate of every known one. "
+        "More: fewer landmarks are mapped twice, and fewer of those that are close together at all",
+        default=0.99999,
+    )
+    ambiguity: float = number(
+        1,
+        1e3,
+        "",
+        "a pair is ambiguous if it is not this many times likelier than another. "
+        "More: fewer wrong pairs, more that are left out",
+        default=10.0,
+    )
     confirm: Annotated[
         int,
         Field(
@@ -212,16 +181,14 @@ class LocalizationSettings:
             description="sightings that confirm a landmark. More: fewer false landmarks, true ones later",
         ),
     ] = 4
-    settle: Annotated[
-        float,
-        number(
-            0,
-            600,
-            "s",
-            "time from its first sighting before a landmark is confirmed. "
-            "More: fewer of what walks by, true ones later",
-        ),
-    ] = 1.0
+    settle: float = number(
+        0,
+        600,
+        "s",
+        "time from its first sighting before a landmark is confirmed. "
+        "More: fewer of what walks by, true ones later",
+        default=1.0,
+    )
     memory: Annotated[
         int,
         Field(
@@ -232,16 +199,14 @@ class LocalizationSettings:
         ),
     ] = 10
 
-    unevenness: Annotated[
-        float,
-        number(
-            0,
-            0.5,
-            "m",
-            "standard deviation of where a landmark seems to be from one place or another, beside noise. "
-            "More: a vaguer map that is less easily wrong",
-        ),
-    ] = 0.01
+    unevenness: float = number(
+        0,
+        0.5,
+        "m",
+        "standard deviation of where a landmark seems to be from one place or another, beside noise. "
+        "More: a vaguer map that is less easily wrong",
+        default=0.01,
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> "LocalizationSettings":
@@ -253,7 +218,7 @@ class LocalizationSettings:
         return self
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class NavigationSettings:
     """What a Navigator does with each scan. Immutable; pydantic.ValidationError names a wrong field."""
 
@@ -268,14 +233,12 @@ class NavigationSettings:
         Literal["auto", "odometry", "constant velocity"],
         Field(description="what predicts the pose between scans; auto: odometry when the source has it"),
     ] = "auto"
-    max_width: Annotated[
-        float,
-        number(
-            0.01,
-            10,
-            "m",
-            "wider clusters are not landmarks: the mean of a wall depends on how much of it is in view. "
-            "More: larger things are landmarks, too",
-        ),
-    ] = 0.5
+    max_width: float = number(
+        0.01,
+        10,
+        "m",
+        "wider clusters are not landmarks: the mean of a wall depends on how much of it is in view. "
+        "More: larger things are landmarks, too",
+        default=0.5,
+    )
     filter: LocalizationSettings = field(default_factory=LocalizationSettings)

@@ -5,11 +5,11 @@ from typing import Literal, Self
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.errors import LocalizationError
 from lidarcore.localization.ekf.estimate import Estimate
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.points import Points
-from lidarcore.scan import Array, Ints
 
 State = Literal["starting", "tracking", "coasting", "lost"]
 

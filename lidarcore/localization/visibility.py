@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarcore.scan import Array, Scan
+from lidarcore.arrays import Array
+from lidarcore.scan import Scan
 
 _ARM = 0.3  # m, about what must be in view on both sides of a corner
 _BEAMS = 4  # at least so many on either side

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.arrays import Array, Ints
+from lidarcore.scan import Scan
 
 BEAMS = "lidarcore_msgs/Beams"
 BEAMS_DEFINITION = """\

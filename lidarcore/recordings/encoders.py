@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarcore.scan import Array
+from lidarcore.arrays import Array
 
 
 def dead_reckoning(ticks: Array, metres_per_tick: float, track_width: float) -> Array:

@@ -4,8 +4,8 @@ from array import array
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import relative, wrap
-from lidarcore.scan import Array
 
 SICK_RANGE = 80.0
 """m that a SICK LMS reaches; 81.83 to 81.91 are its error codes."""

@@ -10,12 +10,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.files.streams import lines, open_stream
 from lidarcore.geometry import PoseTrack, compose
 from lidarcore.recordings.encoders import dead_reckoning
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
 from lidarcore.recordings.laser_survey import Survey
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 # The scanner has 682 steps and sends lines of 32; the recorder lost the last of each, so that 660 are left. Without
 # them walls bend: seen from 278 poses at once, they are straight to 8 mm like this and to 12 mm with even steps.

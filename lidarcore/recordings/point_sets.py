@@ -9,9 +9,10 @@ from typing import IO
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.errors import RecordingError
 from lidarcore.recordings.base import Recording
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 PIECE = 1 << 16  # bytes that are taken apart at a time
 MOST_SETS = 1000

@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 WHOLE = 0.75
 """A first or last revolution that sweeps less than this part of its neighbour was cut by start or stop."""

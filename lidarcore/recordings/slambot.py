@@ -8,11 +8,11 @@ from array import array
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import PoseTrack, compose
 from lidarcore.recordings.encoders import dead_reckoning, unwrapped
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
 from lidarcore.recordings.laser_survey import Survey
-from lidarcore.scan import Array
 
 _DEGREES = 360
 _TICK, _TRACK_WIDTH = 0.90 * np.pi * 0.0582 * 3 / 1000, 0.190  # m; tracks slip, a turn has 1000 / 3 ticks

@@ -6,12 +6,12 @@ from html import escape
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import ellipse_outline
-from lidarcore.scan import Array
 
 WIDTH = 380  # units of a panel, which are pixels where three fit beside each other
 _LABELS, _VALUES, _ROW = 112, 80, 20  # units left and right of the bars, and from row to row
-_SIGMAS = 2.4477  # of an ellipse that holds 95 % in the plane
+SIGMAS_95 = 2.4477  # of an ellipse that holds 95 % in the plane
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ def chart(map_: Map, width: int = WIDTH) -> str:
 
 def _outlines(centres: Array, covariances: Array) -> Array:
     """Points (L, 25, 2) around the ellipses that hold 95 %."""
-    return ellipse_outline(centres, covariances, _SIGMAS, 25)
+    return ellipse_outline(centres, covariances, SIGMAS_95, 25)
 
 
 def _grid(box: tuple[float, float, float, float], scale: float) -> str:

@@ -5,8 +5,8 @@ from html import escape
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.reporting.charts import WIDTH, svg
-from lidarcore.scan import Array
 
 _LEFT, _BOTTOM, _TOP, _HEIGHT = 52, 34, 8, 240
 _BOX = 26  # width of a box

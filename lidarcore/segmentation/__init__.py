@@ -6,9 +6,9 @@ Pieces are inclusive ranges of points.
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import inlined, kernel
 from lidarcore.noise import NoiseModel
-from lidarcore.scan import Array, Ints
 from lidarcore.segmentation.ends import place_ends
 from lidarcore.segmentation.merge import merge, surest_corner
 from lidarcore.segmentation.moments import MOMENTS, judge, moments_of

@@ -4,9 +4,9 @@ Beams near a corner fit both walls. To give each to the wall that it happens to 
 and beams of the neighbour bend the line; the bearing at which the lines meet does not look at those beams' own noise.
 """
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
 from lidarcore.noise import NoiseModel
-from lidarcore.scan import Array
 from lidarcore.segmentation.moments import line_of, moments_of
 from lidarcore.segmentation.pieces import Pieces
 from lidarcore.segmentation.split import variance

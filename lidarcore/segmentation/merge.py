@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import inlined, kernel
 from lidarcore.noise import NoiseModel
-from lidarcore.scan import Array, Ints
 from lidarcore.segmentation.moments import CHI2, SQUARES, copy, join, residuals
 from lidarcore.segmentation.pieces import Pieces
 

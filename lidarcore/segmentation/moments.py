@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import inlined
 from lidarcore.noise import NoiseModel
-from lidarcore.scan import Array, Ints
 
 # Columns: number of points, means of x and y, centred second moments per point, means of c² and c s, and what the
 # best line leaves: the sum of squared distances, and the same in variances.

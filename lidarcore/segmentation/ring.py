@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import finite_kernel, inlined, kernel
-from lidarcore.scan import Array, Ints
 
 _SIGMAS = 1.0  # of the difference of two ranges, allowed between neighbours on a wall seen at a grazing angle
 _CLOSED = 4.0  # a ring is closed if the gap at its ends is less than so many beams

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import finite_kernel, inlined, kernel
 from lidarcore.noise import NoiseModel
-from lidarcore.scan import Array, Ints
 from lidarcore.segmentation.pieces import Pieces
 
 _SIGMAS = 3.0  # a point may be this far from the chord by noise

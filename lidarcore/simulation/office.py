@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from lidarcore.scan import Array
+from lidarcore.arrays import Array
 from lidarcore.simulation.rooms import box, polygon
 from lidarcore.simulation.world import World
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lidarcore.scan import Array
+from lidarcore.arrays import Array
 
 Path = Callable[[Array], Array]
 

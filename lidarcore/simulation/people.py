@@ -3,8 +3,9 @@
 import numpy as np
 from scipy.spatial import KDTree
 
+from lidarcore.arrays import Array
 from lidarcore.errors import SimulationError
-from lidarcore.scan import Array
+from lidarcore.geometry import left_of
 from lidarcore.simulation.posts import distances_to_circles
 from lidarcore.simulation.rooms import random_pose
 from lidarcore.simulation.world import World
@@ -42,7 +43,7 @@ class Person:
         self._route, passed = self._route[passed[0] :], passed - passed[0]
         x, y, walked = (np.interp(times, self._route[:, 0], column) for column in self._route.T[1:4])
         middle, ahead = np.stack([x, y], -1), self._route[passed, 4:]
-        left = ahead[:, ::-1] * [-1, 1]
+        left = left_of(ahead)
         swing = _SWING * np.sin(2 * np.pi * walked / _STRIDE)[:, None] * ahead
         return np.stack([middle + _HIP * left + swing, middle - _HIP * left - swing])
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.errors import SimulationError
-from lidarcore.scan import Array
 
 _TRIES = 10_000
 

@@ -5,8 +5,9 @@ from itertools import count
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import compose, relative, wrap
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 from lidarcore.simulation.people import Person
 from lidarcore.simulation.scene import Optics, Scene
 from lidarcore.simulation.settings import OdometryError, SimulationSettings

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import act
-from lidarcore.scan import Array
 from lidarcore.simulation.world import World
 
 # A 9 x 8 m room of 36 wall pieces, 23 of them its outline with 23 corners, as environment A of [CWLF] has them.

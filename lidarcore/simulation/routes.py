@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lidarcore.scan import Array
+from lidarcore.arrays import Array
 
 _STEP = 0.02  # m between the points of a curve
 _PIVOT = 64  # steps of half a turn on the spot

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 from lidarcore.simulation.paths import Path
 from lidarcore.simulation.people import Person, distances_to_legs
 from lidarcore.simulation.posts import Posts

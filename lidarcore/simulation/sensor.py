@@ -4,9 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import wrap
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 from lidarcore.simulation.world import World
 
 RATE = 10.0  # revolutions per second, as an RPLIDAR S1 turns

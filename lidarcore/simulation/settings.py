@@ -4,41 +4,34 @@ from dataclasses import field
 from typing import Annotated
 
 import numpy as np
-from pydantic import ConfigDict, Field, model_validator
-from pydantic.dataclasses import dataclass
+from pydantic import Field, model_validator
 
-from lidarcore.fields import number
+from lidarcore.arrays import Array
+from lidarcore.fields import number, settings
 from lidarcore.localization.settings import OdometryNoise
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 from lidarcore.simulation.worlds import WORLDS, place
 
-_CONFIG = ConfigDict(extra="forbid")
 
-
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class OdometryError:
     """How odometry errs: a random walk as filters assume, and systematic errors of wheels as they do not."""
 
     noise: OdometryNoise = field(default_factory=OdometryNoise)
-    scale: Annotated[
-        float,
-        number(
-            -0.5,
-            0.5,
-            "",
-            "share by which every way is measured too long. More: odometry drifts faster along the way",
-        ),
-    ] = 0.0
-    track: Annotated[
-        float,
-        number(
-            -0.5,
-            0.5,
-            "",
-            "share by which every turn is measured too large. More: odometry's heading drifts faster",
-        ),
-    ] = 0.0
+    scale: float = number(
+        -0.5,
+        0.5,
+        "",
+        "share by which every way is measured too long. More: odometry drifts faster along the way",
+        default=0.0,
+    )
+    track: float = number(
+        -0.5,
+        0.5,
+        "",
+        "share by which every turn is measured too large. More: odometry's heading drifts faster",
+        default=0.0,
+    )
 
     def measured(self, increment: Array, rng: np.random.Generator) -> Array:
         """What wheels say of a true increment (3,) m, m, rad, seen from where it starts."""
@@ -48,7 +41,7 @@ class OdometryError:
         return measured
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class SimulationSettings:
     """Where a simulated robot drives and what it perceives. Immutable; pydantic.ValidationError names a wrong field."""
 
@@ -59,31 +52,27 @@ class SimulationSettings:
         str | None, Field(description="how it moves, one of the world's paths; none for the usual one")
     ] = None
     odometry: OdometryError = field(default_factory=OdometryError)
-    field_of_view: Annotated[
-        float,
-        number(
-            0.1,
-            2 * np.pi,
-            "rad",
-            "angle that the sensor sees, half to either side of ahead. More: more of the room in every scan",
-        ),
-    ] = 2 * np.pi
-    max_range: Annotated[
-        float, number(0.5, 100.0, "m", "nothing farther is seen. More: farther walls are seen")
-    ] = 40.0
+    field_of_view: float = number(
+        0.1,
+        2 * np.pi,
+        "rad",
+        "angle that the sensor sees, half to either side of ahead. More: more of the room in every scan",
+        default=2 * np.pi,
+    )
+    max_range: float = number(
+        0.5, 100.0, "m", "nothing farther is seen. More: farther walls are seen", default=40.0
+    )
     noise: SensorNoise = field(default_factory=lambda: SensorNoise(0.01, 0.001))
-    mixed: Annotated[
-        float,
-        number(
-            0,
-            1,
-            "",
-            "share of the beams at an edge that report a range in between. More: more stray points at edges",
-        ),
-    ] = 0.5
-    dropouts: Annotated[
-        float, number(0, 1, "", "share of the beams that are lost for no reason. More: more holes in walls")
-    ] = 0.003
+    mixed: float = number(
+        0,
+        1,
+        "",
+        "share of the beams at an edge that report a range in between. More: more stray points at edges",
+        default=0.5,
+    )
+    dropouts: float = number(
+        0, 1, "", "share of the beams that are lost for no reason. More: more holes in walls", default=0.003
+    )
     people: Annotated[
         int, Field(ge=0, le=20, description="how many walk about. More: more that moves and hides walls")
     ] = 0

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.scan import Array, Ints
+from lidarcore.arrays import Array, Ints
 
 _STEP = 1e-3  # m between the points where a pattern is made
 _FINE = 50  # such points in a correlation length, at least: between them the variance is lower by a hundredth at most

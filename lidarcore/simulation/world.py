@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints
 from lidarcore.simulation.surface import Surface
 
 

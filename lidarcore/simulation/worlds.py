@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.errors import SimulationError
-from lidarcore.scan import Array
 from lidarcore.simulation.office import LENGTH, MIDDLE, WIDTH, office
 from lidarcore.simulation.paths import ROUND, Path, standing, wandering
 from lidarcore.simulation.posts import Posts, scattered
@@ -47,10 +47,10 @@ def way(path: Path, step: float = 0.25) -> Array:
     return path(np.arange(0, duration, step))[:, :2]
 
 
-def hall(posts: Posts, paths: Mapping[str, Path], name: str = "field") -> Place:
+def hall(posts: Posts, paths: Mapping[str, Path]) -> Place:
     """Posts in a hall so large that its walls are more than 8 m from where x is 0 to 20 m and y within 4 m."""
     walls = rectangular_room(42, 26).walls + np.array([10.0, 0.0])
-    return Place(name, "Field of posts", World(walls), paths, posts)
+    return Place("field", "Field of posts", World(walls), paths, posts)
 
 
 def trajectories() -> dict[str, Route]:

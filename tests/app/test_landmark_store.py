@@ -229,6 +229,23 @@ def test_a_running_map_that_was_cleared_or_deleted_is_written_again_but_not_when
     assert store.status.error is None
 
 
+def test_a_map_is_written_later_where_writing_it_fails_for_a_reason_nobody_foresaw(
+    store: LandmarkStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told, begin = Told(store), store.atlas.begin
+
+    def fail_once(*_: object) -> None:
+        monkeypatch.setattr(store.atlas, "begin", begin)
+        raise MemoryError
+
+    monkeypatch.setattr(store.atlas, "begin", fail_once)
+    store.begin("room.mcap").put(landmarks(2))
+    wait_until(lambda: store.status.error)
+    assert len(told.next().landmarks) == 2
+    assert len(store.map()) == 2
+    assert store.status.error is None
+
+
 @pytest.mark.long
 def test_a_locked_file_is_reported_holds_up_nobody_and_catches_up(store: LandmarkStore) -> None:
     told, run = Told(store), store.begin("room.mcap")

@@ -19,7 +19,6 @@ from lidarcore.geometry import (
     compose,
     compose_jacobians,
     inverse,
-    inverse_jacobian,
     kernels,
     left_of,
     pose_difference,
@@ -133,7 +132,6 @@ def test_analytic_jacobians_are_the_numeric_ones(shape: tuple[int, ...]) -> None
     for analytic, expected in (
         (F, numeric(lambda x: compose(x, b), a)),
         (G, numeric(lambda x: compose(a, x), b)),
-        (inverse_jacobian(a), numeric(inverse, a)),
         (A, numeric(lambda x: relative(x, b), a)),
         (B, numeric(lambda x: relative(a, x), b)),
         (G_pose, numeric(lambda x: act(x, xy), a)),
@@ -182,17 +180,12 @@ def test_compiled_covariances_travel_as_those_on_arrays_do(seed: int) -> None:
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_covariances_travel_as_the_poses_do(shape: tuple[int, ...]) -> None:
-    """Associativity and inversion, which hold only if every Jacobian stands in the right place."""
+    """Associativity, which holds only if every Jacobian stands in the right place."""
     roots = [1e-2 * np.random.default_rng(k).normal(size=(*shape, 3, 3)) for k in range(3)]
     a, b, c = (
         UncertainPose(poses(shape, k), root @ np.swapaxes(root, -1, -2)) for k, root in enumerate(roots)
     )
-    for left, right in (
-        (a.compose(b).compose(c), a.compose(b.compose(c))),
-        (a.inverse().inverse(), a),
-        (a.compose(b).inverse(), b.inverse().compose(a.inverse())),
-        (a.inverse().compose(b), a.relative(b)),
-    ):
+    for left, right in ((a.compose(b).compose(c), a.compose(b.compose(c))),):
         np.testing.assert_allclose(
             pose_difference(left.pose, right.pose), np.zeros_like(left.pose), atol=1e-12
         )

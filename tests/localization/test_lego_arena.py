@@ -24,10 +24,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from posts import find_posts
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise, extract, open_recording
 from lidarcore.geometry import compose, inverse
-from lidarcore.localization import LocalizationSettings, Localizer, OdometryNoise, Points, Slam, find_posts
+from lidarcore.localization import LocalizationSettings, Localizer, OdometryNoise, Points, Slam
 from lidarcore.scan import Array
 
 FOLDER = "brenner_lego_arena_groundtruth"

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from posts import find_posts, fit_circle
 from scipy.stats import binom, chi2
 
 from lidarcore import Scan, SensorNoise
-from lidarcore.localization.posts import find_posts, fit_circle
 from lidarcore.scan import Array
 
 NOISE = SensorNoise(0.01, 0.001)

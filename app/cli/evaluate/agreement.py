@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Set, SettingsFile, check_folder, counting, settings_from
+from ..options import Set, SettingsFile, check_output, counting, settings_from
 from .stations import named_stations
 
 if TYPE_CHECKING:
@@ -35,23 +35,19 @@ def agreement(
     stations, and judged on the other.
     """
     from dataclasses import asdict
-    from json import dumps
 
     from lidarcore import files
-    from lidarcore.evaluation.consistency import tables as consistency_tables
-    from lidarcore.evaluation.repeatability.tables import finite
+    from lidarcore.evaluation.repeatability.tables import json_text
     from lidarcore.evaluation.stations.agreement_study import study
 
-    if output is not None:
-        consistency_tables.check(output, (".json",))
-        check_folder(output)
+    check_output(output, ".json")
     chosen = settings_from(settings, set_)
     with counting("pairs of stations") as tell:
         stations = named_stations(recordings, topic, chosen.sensor.mask)
         found = study(stations, chosen.extraction, calibrated=not given, tell=tell)
     _print(found, by_pair)
     if output is not None:
-        files.write(output, dumps(finite(asdict(found)), indent=1, allow_nan=False) + "\n")
+        files.write(output, json_text(asdict(found)))
 
 
 def _print(found: "AgreementStudy", by_pair: bool) -> None:
@@ -87,7 +83,7 @@ def _cells(found: "Agreement") -> tuple[str, str, str, str]:
     walls, corners = found.walls, found.corners
     return (
         parts,
-        f"{walls.value:.3f} ({walls.low:.3f}–{walls.high:.3f})",
+        walls.span(3),
         f"{min(shares):.2f}, {max(shares):.2f}",
         "too few" if corners.value != corners.value else f"{corners.value:.3f}",
     )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, Seed, Workers, check_folder
+from ..options import MOST, Seed, Workers, check_output, console, numbers
 from ..progress import ForPrograms, counted
 
 if TYPE_CHECKING:
@@ -47,18 +47,13 @@ def calibration(
 
     Takes about five seconds a room.
     """
-    from rich.console import Console
-
     from lidarcore.evaluation.calibration import tables as calibration_tables
     from lidarcore.evaluation.calibration.design import Design
     from lidarcore.evaluation.calibration.study import study
-    from lidarcore.evaluation.consistency import tables as consistency_tables
 
     from .calibration_table import cells_table, parts_table, remarks
 
-    if output is not None:
-        consistency_tables.check(output, (".json",))
-        check_folder(output)
+    check_output(output, ".json")
     usual = Design()
     design = Design(
         rooms=rooms,
@@ -69,11 +64,9 @@ def calibration(
     )
     with counted(design.rooms, for_programs) as done:
         found = study(design, workers or os.cpu_count() or 1, done)
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
+    terminal = console(WIDTH)
     for shown in (parts_table(found), cells_table(found), *remarks(found)):
-        console.print(shown)
+        terminal.print(shown)
     if output is not None:
         calibration_tables.write(found, output)
 
@@ -81,10 +74,6 @@ def calibration(
 def _noise(text: str) -> "SensorNoise":
     from lidarcore import SensorNoise
 
-    try:
-        sigma_range, sigma_bearing, growth = map(float, text.split(","))
-    except ValueError:
-        raise typer.BadParameter(
-            f"--noise {text!r} should be three numbers, m, rad and 1/m: 0.002,0.001,0.0003."
-        ) from None
+    meaning, example = "three numbers, m, rad and 1/m", "0.002,0.001,0.0003"
+    sigma_range, sigma_bearing, growth = numbers("--noise", text, meaning, example)
     return SensorNoise(sigma_range, sigma_bearing, range_growth=growth)

@@ -18,7 +18,9 @@ from ..options import (
     SettingsFile,
     Topic,
     Workers,
-    check_folder,
+    check_output,
+    console,
+    numbers,
     settings_from,
 )
 from ..progress import ForPrograms, progress
@@ -31,8 +33,6 @@ from .map_studies import relocation, walls
 from .stations import stations
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from lidarcore import SensorNoise
     from lidarcore.evaluation.consistency.study import Consistency
 
@@ -100,9 +100,7 @@ def consistency(
     from lidarcore.evaluation.consistency import tables as consistency_tables
     from lidarcore.evaluation.consistency.trials import SEGMENTATIONS
 
-    if output is not None:  # told before minutes of work are lost
-        consistency_tables.check(output, consistency_tables.STUDY_FORMATS)
-        check_folder(output)
+    check_output(output, *consistency_tables.STUDY_FORMATS)
     if segments not in (*SEGMENTATIONS, "both"):
         raise typer.BadParameter(f"--segments {segments} is unknown: give known, found or both.")
     usual = monte_carlo.Design()
@@ -129,21 +127,13 @@ def _show(study: "Consistency", by_room: bool, seconds: float) -> None:
 
     from .consistency_table import tables
 
-    console = _console()
+    terminal = console(WIDTH)
     for table in tables(study, by_room):
-        console.print(table)
-    console.print(
+        terminal.print(table)
+    terminal.print(
         f"{study.trials:,} corner trials, each by {len(FITTERS)} fitters, in {seconds:.1f} s. "
         "± is half of a 95 % confidence interval; area: of the claimed ellipse over the actual one."
     )
-
-
-def _console() -> "Console":
-    """The terminal; a file or a pipe is as wide as the tables need."""
-    from rich.console import Console
-
-    console = Console()
-    return console if console.is_terminal else Console(width=WIDTH)
 
 
 @evaluate.command()
@@ -170,9 +160,7 @@ def repeatability(
 
     from .repeatability_table import remarks, tables
 
-    if output is not None:
-        consistency_tables.check(output)
-        check_folder(output)
+    check_output(output, *consistency_tables.FORMATS)
     chosen = settings_from(settings, set_)
     study = Repeatability(scans, [name.strip() for name in methods.split(",")] if methods else FITTERS)
     for scan in islice(open_recording(recording, topic, chosen.sensor.mask), skip, skip + scans):
@@ -180,11 +168,11 @@ def repeatability(
     summary = study.summary()
     if not any(found.scatter().is_judged for found in (study.corners, study.walls)):
         raise EvaluationError(MOVES if study.moved else f"Nothing can be judged. {summary.message}")
-    console = _console()
+    terminal = console(WIDTH)
     for shown in tables(summary):
-        console.print(shown)
+        terminal.print(shown)
     for remark in remarks(summary):
-        console.print(remark)
+        terminal.print(remark)
     if output is not None:
         repeatability_tables.write(summary, output)
 
@@ -201,10 +189,7 @@ evaluate.command()(walls)
 def _noise(text: str) -> "SensorNoise":
     from lidarcore import SensorNoise
 
-    try:
-        sigma_range, sigma_bearing = map(float, text.split(","))
-    except ValueError:
-        raise typer.BadParameter(f"--noise {text!r} should be two numbers, m and rad: 0.02,0.0034.") from None
+    sigma_range, sigma_bearing = numbers("--noise", text, "two numbers, m and rad", "0.02,0.0034")
     return SensorNoise(sigma_range=sigma_range, sigma_bearing=sigma_bearing)
 
 

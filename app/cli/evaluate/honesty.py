@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Seed, Workers, check_folder, plural
+from ..options import Seed, Workers, check_output, console, plural
 from ..progress import counted
 
 if TYPE_CHECKING:
@@ -37,38 +37,30 @@ def honesty(
     without. Poses are those of all scans against the first; relative poses are of keyframes, 1 and 10 apart.
     """
     from dataclasses import asdict
-    from json import dumps
-
-    from rich.console import Console
 
     from lidarcore import files
-    from lidarcore.evaluation.consistency import tables as consistency_tables
     from lidarcore.evaluation.maps.honesty import study_honesty
-    from lidarcore.evaluation.repeatability.tables import finite
+    from lidarcore.evaluation.repeatability.tables import json_text
     from lidarcore.simulation.worlds import WORLDS
 
-    if output is not None:
-        consistency_tables.check(output, (".json",))
-        check_folder(output)
+    check_output(output, ".json")
     worlds = list(dict.fromkeys(world or WORLDS))
     with counted(runs * len(worlds)) as done:
         found = study_honesty(worlds, runs, seconds, seed, workers or os.cpu_count() or 1, done)
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=_WIDTH)
+    terminal = console(_WIDTH)
     for one in found:
-        console.print(
+        terminal.print(
             f"{one.world}, {_ODOMETRY[one.odometry]}: {plural(one.runs, 'run')}, {one.lost} of them lost; "
             f"{plural(one.loops, 'loop')}, {one.wrong} of them wrong"
         )
-        console.print(_table(one))
-    console.print(
+        terminal.print(_table(one))
+    terminal.print(
         "Honest claims: 95 % of the truths in the 95 % ellipsoids, an ANEES of 1, its mean over the runs within "
         "its band in 95 % of the steps, a median of 2.37 (squared normalised errors, three degrees of freedom)."
     )
     if output is not None:
         told = {"runs": runs, "seconds": seconds, "seed": seed, "worlds": [asdict(one) for one in found]}
-        files.write(output, dumps(finite(told), indent=1, allow_nan=False) + "\n")
+        files.write(output, json_text(told))
 
 
 def _table(found: "Honesty") -> "Table":

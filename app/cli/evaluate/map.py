@@ -1,12 +1,12 @@
 """The command `lidarcore evaluate map`."""
 
-from math import degrees, inf, nan
+from math import degrees, inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, counting, numbers, settings_from
 
 if TYPE_CHECKING:
     from lidarcore import Array
@@ -112,12 +112,8 @@ def _errors(off: "Array") -> str:
 
 
 def _sigmas(text: str) -> tuple[float, float]:
-    try:
-        distance, turn = map(float, text.split(","))
-    except ValueError:
-        distance = turn = nan
+    meaning, example = "two numbers, m and rad, that are not negative", "0.02,0.005"
+    distance, turn = numbers("--own", text, meaning, example)
     if not (0 <= distance < inf and 0 <= turn < inf):
-        raise typer.BadParameter(
-            f"--own {text!r} should be two numbers, m and rad, that are not negative: 0.02,0.005."
-        )
+        raise typer.BadParameter(f"--own {text!r} should be {meaning}: {example}.")
     return distance, turn

@@ -73,6 +73,4 @@ def _box(box: Box | None) -> tuple[str, str]:
 
 
 def _cell(figure: Interval) -> str:
-    if figure.value != figure.value:
-        return ""
-    return f"{figure.value:.2f} ({figure.low:.2f}–{figure.high:.2f})"
+    return "" if figure.value != figure.value else figure.span(2)

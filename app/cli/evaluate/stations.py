@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, Set, SettingsFile, check_folder, counting, settings_from
+from ..options import MOST, Set, SettingsFile, check_output, console, counting, settings_from
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -37,17 +37,12 @@ def stations(
 
     A recording has several stations if its file says so, or if the sensor was seen to move between them.
     """
-    from rich.console import Console
-
-    from lidarcore.evaluation.consistency import tables as consistency_tables
     from lidarcore.evaluation.stations import tables as station_tables
     from lidarcore.evaluation.stations.study import study
 
     from .stations_table import limits_table, station_table, table
 
-    if output is not None:
-        consistency_tables.check(output, (".json",))
-        check_folder(output)
+    check_output(output, ".json")
     names = [name.strip() for name in methods.split(",")]
     chosen = settings_from(settings, set_)
     with counting("stations") as tell:
@@ -59,16 +54,14 @@ def stations(
             calibrated=not given,
             tell=tell,
         )
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=WIDTH)
-    console.print(table(found))
-    console.print(limits_table(found))
+    terminal = console(WIDTH)
+    terminal.print(table(found))
+    terminal.print(limits_table(found))
     if by_station:
-        console.print(station_table(found))
+        terminal.print(station_table(found))
     for station in found.stations:
         if station.remark is not None:
-            console.print(f"{station.name}: {station.remark}")
+            terminal.print(f"{station.name}: {station.remark}")
     if output is not None:
         station_tables.write(found, output)
 

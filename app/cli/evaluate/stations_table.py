@@ -92,6 +92,4 @@ def _against(study: StationStudy, figures: Figures, m: int) -> str:
 
 
 def _cell(figure: Interval, digits: int) -> str:
-    if figure.value != figure.value:
-        return ""
-    return f"{figure.value:.{digits}f} ({figure.low:.{digits}f}–{figure.high:.{digits}f})"
+    return "" if figure.value != figure.value else figure.span(digits)

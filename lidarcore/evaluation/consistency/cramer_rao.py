@@ -3,11 +3,12 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
 from lidarcore.corners import intersect
 from lidarcore.lines import LINE_FIELDS
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, as_row
+from lidarcore.scan import as_row
 from lidarcore.tables import (
     CORNER_CONSISTENT,
     CORNER_FIELDS,

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.trials import Trials
 from lidarcore.evaluation.intervals import Interval, ratio, share
-from lidarcore.scan import Array
-
-Mask = NDArray[np.bool_]
+from lidarcore.geometry import left_of
 
 LEVELS = (0.50, 0.95, 0.99)
 GATES = -2 * np.log1p(-np.array(LEVELS))  # quantiles of chi-square with 2 degrees of freedom
@@ -88,7 +86,7 @@ def tally(trials: Trials) -> Array:
     Raises EvaluationError for a covariance that is not positive definite.
     """
     e = trials.errors
-    found: Mask = np.isfinite(e[..., 0])  # (P, K)
+    found: Bools = np.isfinite(e[..., 0])  # (P, K)
     e = np.where(found[..., None], e, 0.0)
     nees, claimed = _claims(e, trials.covariances, found)
     squares, m = (e**2).sum(-1), found.sum(1)
@@ -102,7 +100,7 @@ def tally(trials: Trials) -> Array:
             found.size,
             found.sum(),
             np.einsum("pki,pi->", e, sight),
-            np.einsum("pki,pi->", e, sight[:, ::-1] * [-1, 1]),
+            np.einsum("pki,pi->", e, left_of(sight)),
             squares.sum(),
             (squares.sum(1) / np.trace(trials.bounds, axis1=1, axis2=2)).sum(),
             ((e.sum(1) ** 2).sum(-1) - squares.sum(1)).sum(),
@@ -118,7 +116,7 @@ def tally(trials: Trials) -> Array:
     )
 
 
-def _claims(e: Array, covariances: Array, found: Mask) -> tuple[Array, Array]:
+def _claims(e: Array, covariances: Array, found: Bools) -> tuple[Array, Array]:
     """e^T C^-1 e and root(det C) (P, K) of what was found, 0 elsewhere."""
     xx, xy, yy = covariances[..., 0, 0], covariances[..., 0, 1], covariances[..., 1, 1]
     det = xx * yy - xy * xy

@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.consistency.design import KINDS, Design, room
 from lidarcore.evaluation.consistency.figures import FIGURES, SUMS, tally
 from lidarcore.evaluation.consistency.trials import Segmentation, simulate
@@ -16,7 +17,6 @@ from lidarcore.evaluation.repeatability.places import Place, places
 from lidarcore.evaluation.workers import outcomes
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array
 from lidarcore.settings import Covariance, ExtractionSettings
 
 __all__ = ["ALL_ROOMS", "Consistency", "Design", "Row", "run_chunk", "study"]

@@ -6,6 +6,7 @@ from typing import Literal, cast
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
 from lidarcore.corners import intersect
 from lidarcore.evaluation.repeatability.places import Place
@@ -15,7 +16,6 @@ from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, WORK, fit_piece
 from lidarcore.lines.regression import NOT_FINITE, OK
 from lidarcore.noise import NoiseModel
 from lidarcore.polar import cos_sin
-from lidarcore.scan import Array, Ints
 from lidarcore.settings import ExtractionSettings
 from lidarcore.tables import (
     CORNER_CONSISTENT,

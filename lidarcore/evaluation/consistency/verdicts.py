@@ -17,7 +17,7 @@ def verdict(coverage_95: Interval) -> Verdict:
     """Whether ellipses of this coverage can be believed; open if the interval reaches over an edge of HONEST.
 
     A study has trials enough to show that a coverage lies within HONEST. A window of scans has not: there
-    `repeatability_summary.verdict` is content with a wider band, and asks the 50 % ellipses, too.
+    `lidarcore.evaluation.repeatability.summary.verdict` is content with a wider band, and asks the 50 % ellipses, too.
     """
     return wrong(coverage_95, HONEST) or ("true" if within(coverage_95, HONEST) else "open")
 

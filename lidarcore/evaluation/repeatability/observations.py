@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.evaluation.consistency.design import KINDS
-from lidarcore.scan import Array, Ints
 
 OBSERVATION = 10
 """Numbers of an observation: x, y of a corner or alpha, r of a wall; published (4), consistent (4)."""

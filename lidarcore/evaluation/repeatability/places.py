@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
 from lidarcore.corners import intersect
 from lidarcore.evaluation.consistency.cramer_rao import bounded_line
 from lidarcore.geometry import unit_vectors
 from lidarcore.lines import LINE_FIELDS
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints
 from lidarcore.simulation import random_pose
 from lidarcore.simulation.world import World
 from lidarcore.tables import CORNER_CONSISTENT, CORNER_FIELDS

@@ -7,21 +7,19 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.consistency.figures import GATES
 from lidarcore.evaluation.intervals import LEVEL, intervals, shares, wilson
 from lidarcore.evaluation.repeatability.observations import Observations, covariances, root_det
 from lidarcore.evaluation.repeatability.summary import FeatureClaim, FeatureScatter, Judgement, Matrix
 from lidarcore.geometry import squared_mahalanobis_2d
-from lidarcore.scan import Array, Ints
 
 LEAST = 10
 """A corner or wall seen fewer times is not judged."""
 
-Mask = NDArray[np.bool_]
 Item = TypeVar("Item")
 
 
@@ -147,7 +145,7 @@ def scatter(observations: Observations, scans: int) -> Scatter:
     """
     table, starts = np.ascontiguousarray(np.moveaxis(observations.table, 0, -1)), observations.starts
     feature = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(observations.ids)))
-    seen: Mask = np.isfinite(table[:, 0])  # (M, R); sums are quickest along the last axis
+    seen: Bools = np.isfinite(table[:, 0])  # (M, R); sums are quickest along the last axis
     counts = _sums(seen.astype(np.float64), starts)
     means = _sums(np.where(seen[:, None], table, 0.0), starts) / np.maximum(counts, 1)[:, None]
     x, y = np.where(seen[:, None], table[:, :2] - means[:, :2, feature], 0.0).swapaxes(0, 1)
@@ -169,7 +167,7 @@ def scatter(observations: Observations, scans: int) -> Scatter:
     )
 
 
-def _tally(nees: Array, judged: Mask, groups: Ints, n: int) -> Array:
+def _tally(nees: Array, judged: Bools, groups: Ints, n: int) -> Array:
     """(n, M, 2, 4) of residuals (M, 2, R) in n groups (R,): those within the ellipses of GATES, and all; none else."""
     cells = np.arange(np.prod(nees.shape[:2])).reshape(*nees.shape[:2], 1)
     within = sum(

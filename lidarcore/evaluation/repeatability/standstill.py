@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import inlined, kernel
 from lidarcore.evaluation.repeatability.observations import Observations
 from lidarcore.evaluation.repeatability.scatter import LEAST
-from lidarcore.scan import Array, Ints
 
 RECENT = 3  # scans in which nearly all features must be new ones for a leap
 _NEW = 0.75

@@ -21,7 +21,7 @@ def write(summary: Summary, path: Path) -> None:
 
 def to_json(summary: Summary) -> str:
     """A summary as JSON, null for what cannot be told yet."""
-    return json.dumps(finite(asdict(summary)), indent=1, allow_nan=False) + "\n"
+    return json_text(asdict(summary))
 
 
 def to_csv(summary: Summary) -> str:
@@ -58,6 +58,11 @@ def _lines(summary: Summary) -> Iterator[dict[str, Any]]:
                 line |= {figure: interval["value"]}
                 line |= {f"{figure}_{end}": interval[end] for end in ("low", "high")}
             yield line
+
+
+def json_text(document: Any) -> str:
+    """A document as the text of a JSON file, with null for every number that is not finite."""
+    return json.dumps(finite(document), indent=1, allow_nan=False) + "\n"
 
 
 def finite(document: Any) -> Any:

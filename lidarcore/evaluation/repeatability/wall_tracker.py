@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.features import Features
 from lidarcore.geometry import wrap
 
@@ -43,7 +42,7 @@ class _Known:
     def nothing(cls) -> "_Known":
         return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty((0, 4)))
 
-    def __getitem__(self, which: NDArray[np.bool_]) -> "_Known":
+    def __getitem__(self, which: Bools) -> "_Known":
         return _Known(self.ids[which], self.frames[which], self.near[which], self.lines[which])
 
     def __add__(self, other: "_Known") -> "_Known":

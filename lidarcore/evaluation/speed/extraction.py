@@ -8,11 +8,12 @@ from functools import partial
 import numpy as np
 
 from lidarcore import extraction
+from lidarcore.arrays import Array, Ints
 from lidarcore.extraction import compare, extract
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, fit_beams
 from lidarcore.noise import SensorNoise
 from lidarcore.rplidar.protocol import Answer, StreamDecoder, encode_dense
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, furnished_room, random_pose
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.evaluation.speed.extraction import Timing, time_calls
 from lidarcore.geometry import act_inverse
 from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
@@ -12,13 +13,11 @@ from lidarcore.localization.ekf import kernels
 from lidarcore.localization.ekf.motion import OdometryMotion
 from lidarcore.localization.ekf.passive import one_thread
 from lidarcore.localization.landmarks import Landmarks
-from lidarcore.scan import Array
 
-CORNERS, REACH, SPACING = (
-    12,
-    5.0,
-    2.2,
-)  # landmarks in sight of the localizer; m, how far SLAM sees; m between landmarks
+CORNERS = 12  # landmarks in sight of the localizer
+REACH, SPACING = 5.0, 2.2  # m, how far SLAM sees; m between landmarks
+SCANS = 450  # of SLAM
+REPEATS = 5  # of the full filter
 PERIOD, SPEED, SIGMA = 0.1, 1.0, 0.02  # s between scans, m/s, m of a sighting
 SETTLING = 50  # scans that are not timed: the first compile, or load, what they need
 COVARIANCE = np.diag([0.02, 0.02, 0.01]) ** 2
@@ -29,7 +28,7 @@ class ScanTimes:
     """Mean, 99th percentile and worst processor time of a whole Slam.step, ms; the mean it should stay below, if set.
 
     in_sight  landmarks per scan, on average
-    full      a full filter in numpy, its association given: mean, ms; None if it was too large to try
+    full      a full filter in numpy, its association given: mean, ms
     """
 
     landmarks: int
@@ -37,7 +36,7 @@ class ScanTimes:
     mean: float
     p99: float
     worst: float
-    full: float | None
+    full: float
     limit: float | None
 
 
@@ -73,22 +72,20 @@ def time_localizer(seed: int = 0) -> list[Timing]:
     ]
 
 
-def time_slam(
-    landmarks: int, limit: float | None, scans: int = 450, full: bool = True, seed: int = 0
-) -> ScanTimes:
+def time_slam(landmarks: int, limit: float | None) -> ScanTimes:
     """Along a path through a map of so many landmarks, all of which it knows from the start."""
-    rng = np.random.default_rng(seed)
-    world, poses = _world(landmarks, rng), _path(landmarks, scans)
+    rng = np.random.default_rng(0)
+    world, poses = _world(landmarks, rng), _path(landmarks, SCANS)
     points = Points(world + rng.normal(0, SIGMA, world.shape), SIGMA**2 * np.eye(2))
     slam = Slam(LocalizationSettings(), poses[0], COVARIANCE, Landmarks.of(points))
-    times, in_sight = np.empty(scans), np.empty(scans)
+    times, in_sight = np.empty(SCANS), np.empty(SCANS)
     for k, pose in enumerate(poses):
         seen = _sightings(pose, world, rng)
         start = time.thread_time()
         slam.step(seen, PERIOD * k, pose)
         times[k], in_sight[k] = 1e3 * (time.thread_time() - start), len(seen)
     timed = times[SETTLING:]
-    yardstick = _time_full_filter(landmarks, round(float(in_sight.mean()))) if full else None
+    yardstick = _time_full_filter(landmarks, round(float(in_sight.mean())))
     return ScanTimes(
         landmarks, float(in_sight.mean()), float(timed.mean()), float(np.percentile(timed, 99)), float(timed.max()),
         yardstick, limit,
@@ -118,16 +115,16 @@ def _sightings(pose: Array, world: Array, rng: np.random.Generator) -> Points:
 
 
 @one_thread
-def _time_full_filter(landmarks: int, pairs: int, repeats: int = 5) -> float:
+def _time_full_filter(landmarks: int, pairs: int) -> float:
     """Mean time, ms, to predict and correct all of a map by so many pairs as in the textbook, H being sparse."""
     n = 3 + 2 * landmarks
     P, F, R = SIGMA**2 * np.eye(n), np.eye(3), SIGMA**2 * np.eye(2 * pairs)
     columns, H = np.arange(3 + 2 * pairs), np.ones((2 * pairs, 3 + 2 * pairs))
     start = time.thread_time()
-    for _ in range(repeats):
+    for _ in range(REPEATS):
         P[:3] = F @ P[:3]
         P[:, :3] = P[:, :3] @ F.T
         PHt = P[:, columns] @ H.T
         K = np.linalg.solve(H @ PHt[columns] + R, PHt.T).T
         P -= K @ PHt.T
-    return 1e3 * (time.thread_time() - start) / repeats
+    return 1e3 * (time.thread_time() - start) / REPEATS

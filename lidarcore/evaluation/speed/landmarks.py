@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.landmarks import Atlas, Box, Circle, Filter, Landmark, LandmarkMap
-from lidarcore.scan import Array
 
 DENSITY = 1.0  # landmarks per m²
 WRITES_HZ, WRITTEN = 10, 12  # what a live run puts: so many landmarks so often

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
-from lidarcore.evaluation.consistency.figures import GATES, LEVELS, Mask
+from lidarcore.arrays import Array, Bools, Ints
+from lidarcore.evaluation.consistency.figures import GATES, LEVELS
 from lidarcore.evaluation.repeatability.feature_set import FeatureSet, moved, moved_ends
 from lidarcore.evaluation.repeatability.wall_tracker import shared_extents, unwrapped
 from lidarcore.geometry import act, act_jacobians, squared_mahalanobis
@@ -127,16 +127,16 @@ class _Walls:
         V = pair.first.covariances[a] + F @ pair.second.covariances[b] @ F.swapaxes(1, 2)
         return cls(here - there, J, V)
 
-    def correction(self, of: Mask, weights: Array | None = None) -> tuple[Array, Array]:
+    def correction(self, of: Bools, weights: Array | None = None) -> tuple[Array, Array]:
         """What some of the walls correct the pose by (3,), and its covariance; hardly known where they do not tell."""
         information = np.linalg.inv(self.V[of]) * (1.0 if weights is None else weights[of, None, None])
         weighted = self.J[of].swapaxes(1, 2) @ information
         P = np.linalg.inv((weighted @ self.J[of]).sum(0) + _HARDLY)
         return P @ (weighted @ self.e[of][..., None]).sum(0)[:, 0], P
 
-    def but(self, i: int) -> Mask:
+    def but(self, i: int) -> Bools:
         """All walls but this one."""
-        others: Mask = np.arange(len(self.e)) != i
+        others: Bools = np.arange(len(self.e)) != i
         return others
 
     def is_told(self, i: int) -> bool:

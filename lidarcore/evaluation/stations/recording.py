@@ -5,8 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.recordings import Recording
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 _SECTORS = 180
 _AROUND = 10  # scans whose means are compared, before and after

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.consistency.design import KINDS
@@ -16,7 +16,7 @@ from lidarcore.evaluation.repeatability.scatter import LEAST, Scatter
 from lidarcore.evaluation.repeatability.statistics import WINDOW, Repeatability
 from lidarcore.extraction import compare
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 from lidarcore.settings import Covariance, ExtractionSettings
 
 ENOUGH = 200
@@ -66,7 +66,7 @@ class Figures:
     def __len__(self) -> int:
         return len(self.counts)
 
-    def __getitem__(self, which: NDArray[np.bool_]) -> "Figures":
+    def __getitem__(self, which: Bools) -> "Figures":
         """Figures of the chosen features (F,)."""
         return Figures(*(getattr(self, field.name)[which] for field in fields(self)))
 

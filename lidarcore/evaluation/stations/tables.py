@@ -1,12 +1,11 @@
 """A study of stations as JSON."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from lidarcore import files
-from lidarcore.evaluation.repeatability.tables import finite
+from lidarcore.evaluation.repeatability.tables import json_text
 from lidarcore.evaluation.stations.study import Figures, StationStudy
 
 
@@ -23,7 +22,7 @@ def write(study: StationStudy, path: Path) -> None:
             for m, name in enumerate(study.methods)
         ],
     }
-    files.write(path, json.dumps(finite(document), indent=1, allow_nan=False) + "\n")
+    files.write(path, json_text(document))
 
 
 def _figures(figures: Figures, m: int, study: StationStudy) -> dict[str, Any]:

@@ -7,14 +7,14 @@ one by one and contradict each other are then left out until all are jointly com
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import linear_sum_assignment
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import chi_square_gate, squared_mahalanobis
 from lidarcore.localization.ekf import kernels
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import LocalizationSettings
-from lidarcore.scan import Array, Ints
 
 _FORBIDDEN = 1e9
 
@@ -45,7 +45,7 @@ class Association:
         nothing, no_pairs = np.empty(0, np.int64), np.empty((0, 2), np.int64)
         return cls(nothing, nothing, no_pairs, no_pairs, np.arange(observed), nothing)
 
-    def trusting(self, trusted: NDArray[np.bool_]) -> "Association":
+    def trusting(self, trusted: Bools) -> "Association":
         """This association, using only pairs whose landmark is trusted (L,)."""
         used = trusted[self.landmark]
         pairs = np.stack([self.observed, self.landmark], -1)
@@ -124,7 +124,7 @@ def _assign(costs: Array, unmatched: float) -> tuple[Ints, Ints, float]:
 
 def _rivalled(
     costs: Array, rows: Ints, columns: Ints, total: float, unmatched: float, margin: float
-) -> NDArray[np.bool_]:
+) -> Bools:
     """(P,) true for pairs whose best replacement costs less than the margin more."""
     allowed = costs < _FORBIDDEN
     contested = (allowed.sum(axis=1)[rows] > 1) | (allowed.sum(axis=0)[columns] > 1)

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.errors import LocalizationError, MotionError
 from lidarcore.geometry import chi_square_gate, relative, wrap
 from lidarcore.geometry.kernels import squared_mahalanobis
 from lidarcore.localization.ekf.association import Association, worst_pair
 from lidarcore.localization.settings import LocalizationSettings
-from lidarcore.scan import Array, Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)

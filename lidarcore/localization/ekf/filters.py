@@ -6,6 +6,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.localization.ekf.estimate import Estimate
 from lidarcore.localization.ekf.localizer import KnownMap
 from lidarcore.localization.ekf.slam import Slam, Visible
@@ -13,7 +14,6 @@ from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.points import Points
 from lidarcore.localization.relocalization import relocalize
 from lidarcore.localization.settings import LocalizationSettings, NavigationSettings
-from lidarcore.scan import Array
 
 _REST = 5.0  # s; people who stand are clusters, and seldom stand longer
 

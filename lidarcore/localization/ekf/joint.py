@@ -5,13 +5,12 @@ into reach. The result is that of the full filter, not an approximation.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import act, act_jacobians, wrap
 from lidarcore.localization.ekf import kernels
 from lidarcore.localization.ekf.estimate import Innovation
 from lidarcore.localization.ekf.passive import Gaussian, Passive
-from lidarcore.scan import Array, Ints
 
 _SAME = 1e-6  # m, as far apart as one thing may lie from itself
 _MOST, _KEPT = 160, 20  # rows at which the active part is cut down, and landmarks that then stay
@@ -122,7 +121,7 @@ class JointState:
         g.P[: g.n, : g.n] -= W @ W.T
         self.keep(np.arange(len(self)) != dropped)
 
-    def keep(self, kept: NDArray[np.bool_]) -> None:
+    def keep(self, kept: Bools) -> None:
         """Forget the landmarks that are not in kept (L,)."""
         self._slots, dropped = self._slots[kept], self._slots[~kept]
         known = dropped[2 * dropped < self._passive.n]

@@ -6,9 +6,9 @@ are T_world_sensor. Both are changed in place.
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import inlined, kernel
 from lidarcore.geometry.kernels import rotated_covariance, squared_mahalanobis_2d, unrotate, wrap
-from lidarcore.scan import Array, Ints
 
 
 @kernel

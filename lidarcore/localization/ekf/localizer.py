@@ -6,6 +6,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, act_inverse, chi_square_gate, rotation
 from lidarcore.localization.ekf import kernels
 from lidarcore.localization.ekf.association import match
@@ -17,7 +18,6 @@ from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.observations import in_moments, joined
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import LocalizationSettings
-from lidarcore.scan import Array
 
 
 class Localizer:

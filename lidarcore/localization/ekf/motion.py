@@ -8,6 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lidarcore.arrays import Array
 from lidarcore.errors import LocalizationError
 from lidarcore.geometry import check_covariance
 from lidarcore.localization.ekf.motion_kernels import (
@@ -20,7 +21,6 @@ from lidarcore.localization.ekf.motion_kernels import (
     glide,
 )
 from lidarcore.localization.settings import LocalizationSettings, OdometryNoise, VelocityNoise
-from lidarcore.scan import Array
 
 _STANDING = np.zeros(3)
 

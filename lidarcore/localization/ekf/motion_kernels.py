@@ -5,10 +5,10 @@ States begin with T_world_sensor; a step gives the next state, its Jacobian and 
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.geometry.kernels import compose_with_jacobians, rotate, rotated_covariance
 from lidarcore.localization.ekf.kernels import odometry_variances, propagate
-from lidarcore.scan import Array
 
 _SERIES = 1e-3  # rad, below which the series of the arc is exact to rounding and its quotients are not
 _NODES, _WEIGHTS = (

@@ -12,11 +12,10 @@ from typing import Any, Self, TypeVar
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.localization.ekf.kernels import subtract_products
-from lidarcore.scan import Array, Ints
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -101,7 +100,7 @@ class Passive:
         follow: Array,
         Psi: Array,
         theta: Array,
-        passive: NDArray[np.bool_],
+        passive: Bools,
     ) -> None:
         """Take over the mean x (k,) and covariance P (k, k) of active coordinates, and what they did to the others.
 

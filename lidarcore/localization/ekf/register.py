@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import chi_square_gate, squared_mahalanobis
 from lidarcore.localization.ekf.association import Association
 from lidarcore.localization.ekf.joint import JointState
@@ -10,7 +11,6 @@ from lidarcore.localization.ekf.kernels import near_pairs
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.settings import LocalizationSettings
 from lidarcore.localization.visibility import Costs
-from lidarcore.scan import Array, Ints
 
 _SECTORS = 64  # directions from which a landmark may have been seen, 5.6 degrees each
 _FORGOTTEN = 3.0  # s without a sighting, after which a tentative landmark is dropped
@@ -33,7 +33,7 @@ class Register:
         self.possible = self.recognised = 0  # confirmed ones that the last scan could have shown, and did
         self.ids: Ints = np.empty(0, np.int64)
         self.kinds: NDArray[np.str_] = np.empty(0, np.str_)
-        self.confirmed: NDArray[np.bool_] = np.empty(0, np.bool_)
+        self.confirmed: Bools = np.empty(0, np.bool_)
         self.counts: Ints = np.empty(0, np.int64)
         self.first_seen: Array = np.empty(0)
         self.last_seen: Array = np.empty(0)
@@ -75,7 +75,7 @@ class Register:
 
     def count(
         self, association: Association, observed: int, stamp: float, costs: Costs, views: Array
-    ) -> NDArray[np.bool_]:
+    ) -> Bools:
         """Count a scan of so many observations at the stamp (s); (L,) true for the landmarks that are to be kept.
 
         views (L, 2) m, world frame, lead from each landmark to the sensor. Costs say what trust is lost by those
@@ -99,10 +99,10 @@ class Register:
         settled = self.last_seen - self.first_seen >= self._settle
         self.confirmed = self.confirmed | ((self._trust >= self._confirm) & settled)
         fresh = stamp - self.last_seen <= _FORGOTTEN
-        kept: NDArray[np.bool_] = (self._trust >= 0) & (self.confirmed | fresh)
+        kept: Bools = (self._trust >= 0) & (self.confirmed | fresh)
         return kept
 
-    def _recognise(self, seen: Ints, observed: int, expected: NDArray[np.bool_]) -> None:
+    def _recognise(self, seen: Ints, observed: int, expected: Bools) -> None:
         expected[seen] = True
         self.possible = min(int((expected & self.confirmed).sum()), observed)
         self.recognised = int(self.confirmed[seen].sum())
@@ -115,7 +115,7 @@ class Register:
         self._trust[kept] = max(self._trust[kept], self._trust[dropped])
         self._seen_from[kept] = np.fmax(self._seen_from[kept], self._seen_from[dropped])
 
-    def keep(self, kept: NDArray[np.bool_]) -> None:
+    def keep(self, kept: Bools) -> None:
         """Forget the landmarks that are not in kept (L,)."""
         for name in (
             "ids",
@@ -141,8 +141,8 @@ _APART = 0.3  # m; what lies farther apart is not merged for the uncertainty of 
 def find_duplicate(
     joint: JointState,
     kinds: NDArray[np.str_],
-    confirmed: NDArray[np.bool_],
-    seen: NDArray[np.bool_],
+    confirmed: Bools,
+    seen: Bools,
     settings: LocalizationSettings,
 ) -> tuple[int, int] | None:
     """Two confirmed landmarks so near, given their joint covariance, that neither is new beside the other, or None.

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import act_inverse, chi_square_gate
 from lidarcore.geometry.kernels import compose_with_jacobians
 from lidarcore.localization.ekf.association import Association, match
@@ -20,7 +21,6 @@ from lidarcore.localization.observations import in_moments, joined
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import LocalizationSettings
 from lidarcore.localization.visibility import Costs
-from lidarcore.scan import Array, Ints
 
 Visible = Callable[[Array], Costs]
 """Which of the points (L, 2) m, sensor frame, should be seen if they are there: the trust they lose if they are not."""
@@ -69,7 +69,7 @@ class Slam:
         return self._register.ids.copy()
 
     @property
-    def confirmed(self) -> NDArray[np.bool_]:
+    def confirmed(self) -> Bools:
         """(L,) true for landmarks that were seen often enough."""
         return self._register.confirmed
 

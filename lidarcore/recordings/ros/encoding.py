@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.arrays import Array
 from lidarcore.errors import RecordingError
 from lidarcore.features import Features
 from lidarcore.recordings.beams import BEAMS, Grid, grid
 from lidarcore.recordings.ros.messages import LASER, ODOMETRY, TRANSFORMS, typestore
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 MARKERS = "visualization_msgs/MarkerArray"
 SENSOR_FRAME, ODOMETRY_FRAME = "laser", "odom"

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.recordings.ros.messages import frame
-from lidarcore.scan import Array
 
 MOST_FRAMES = 10_000  # robots have hundreds
 

@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.errors import RecordingError, ScanError
 from lidarcore.recordings.base import MOST_BEAMS
 from lidarcore.recordings.beams import BEAMS, BEAMS_DEFINITION
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 LASER = "sensor_msgs/LaserScan"
 ODOMETRY = "nav_msgs/Odometry"

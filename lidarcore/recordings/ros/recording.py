@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.geometry import PoseTrack, compose
 from lidarcore.recordings.base import Recording
 from lidarcore.recordings.beams import BEAMS, fits
 from lidarcore.recordings.ros.frames import FrameTree, planar, rotation
 from lidarcore.recordings.ros.messages import LASER, ODOMETRY, Message, decode, frame, scan_of, seconds
-from lidarcore.scan import Array, Scan
+from lidarcore.scan import Scan
 
 UPRIGHT = np.cos(np.radians(10))
 

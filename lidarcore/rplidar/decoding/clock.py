@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarcore.scan import Array, Ints
+from lidarcore.arrays import Array, Ints
 
 LEAK = 0.01
 """How much slower the sensor's clock may run than it says: 9,200 samples/s are told, 9,259 follow from 108 us."""

@@ -10,13 +10,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.arrays import Bools, Ints
 from lidarcore.rplidar.answers import Answer
 from lidarcore.rplidar.decoding.clock import SampleClock
 from lidarcore.rplidar.decoding.counts import Counts
 from lidarcore.rplidar.decoding.packets import FORMATS
 from lidarcore.rplidar.decoding.revolution import TURN, Revolution
 from lidarcore.rplidar.decoding.spacing import misfits, missing
-from lidarcore.scan import Ints
 
 DEGREE = 1 << 16
 LEAP = 30 * DEGREE  # no two nodes in a row are this far apart, but for a loss
@@ -195,7 +195,7 @@ def _joined(gaps: Ints, more: Ints) -> Ints:
     return joined[np.argsort(joined[:, 0], kind="stable")]
 
 
-def _gaps(turned: Ints, after_loss: NDArray[np.bool_]) -> Ints:
+def _gaps(turned: Ints, after_loss: Bools) -> Ints:
     """(G, 2) 1/65536 degree: where bytes were lost, or neighbours, or the turn's ends, are far apart."""
     edges = np.concatenate([[0], np.maximum.accumulate(turned), [TURN]]).clip(0, TURN)
     widths = np.diff(edges)

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from lidarcore.arrays import Ints
 from lidarcore.rplidar.answers import Answer
-from lidarcore.scan import Ints
 
 Samples = tuple[Ints, Ints]
 """Distances (P, n) in 1/4 mm, 0: no return; lags in 1/65536 degree, (P, n) or one for all."""

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.arrays import Array, Ints
+from lidarcore.scan import Scan
 
 TURN = 360 << 16  # 1/65536 degree
 

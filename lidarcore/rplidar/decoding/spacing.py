@@ -5,10 +5,9 @@ that the number of nodes in a turn is right all the same.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from lidarcore.arrays import Bools, Ints
 from lidarcore.rplidar.decoding.revolution import TURN
-from lidarcore.scan import Ints
 
 LEAST_NODES = 32  # in a turn, of which a usual step can be told
 ORDINARY = 0.8  # so many of the nodes are ordinary
@@ -18,7 +17,7 @@ NEAR = 0.2  # of the usual step: neither jitter nor a loss
 LONG = 1.6  # of the usual step: a node is missing
 
 
-def misfits(turned: Ints) -> NDArray[np.bool_]:
+def misfits(turned: Ints) -> Bools:
     """(N,) true for nodes far from the middle of neighbours two steps apart, turned (N,) 1/65536 degree.
 
     Only where the others are even: sound angles of an A1 now and then go back by degrees.

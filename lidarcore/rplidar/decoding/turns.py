@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lidarcore.arrays import Ints
 from lidarcore.rplidar.decoding.clock import SampleClock
 from lidarcore.rplidar.decoding.counts import Counts
 from lidarcore.rplidar.decoding.payloads import Decoder
 from lidarcore.rplidar.decoding.revolution import TURN, Revolution
-from lidarcore.scan import Ints
 
 TURN_Q8 = 360 << 8  # 1/256 degree
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array
 from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.rplidar.protocol import Answer, ScanMode, encode_dense, encode_nodes
-from lidarcore.scan import Array
 from lidarcore.simulation.paths import ROUND, standing, wandering
 from lidarcore.simulation.people import Person
 from lidarcore.simulation.rooms import furnished_room
