@@ -147,12 +147,12 @@ def _on_precision(found: Calibration) -> list[str]:
     return [f"To know each part to within 15 %, take more scans than these {found.scans}: {parts}."]
 
 
-def _on_unevenness(size: Interval, reckoned_with: float) -> list[str]:
+def _on_unevenness(size: Interval, assumed: float) -> list[str]:
     if size.low > 0:
         return []
     return [
         f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm. Since walls "
-        f"seldom are, {_number(reckoned_with, 1e3, 1)} mm are reckoned with."
+        f"seldom are, {_number(assumed, 1e3, 1)} mm are assumed."
     ]
 
 

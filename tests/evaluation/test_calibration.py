@@ -338,7 +338,7 @@ def test_the_command_writes_json(data):
 
 
 @pytest.mark.parametrize("most", [0.0005, 0.002, 0.008, 0.1])
-def test_where_walls_may_be_straight_half_of_such_rooms_are_less_uneven_than_is_reckoned_with(most):
+def test_where_walls_may_be_straight_half_of_such_rooms_are_less_uneven_than_is_assumed(most):
     """Rooms drawn with sizes about 4 mm, by a factor of 2, of which those remain that could have been overlooked.
 
     The share is 0.5 ± 0.008 at least (4,000 rooms remain); five of these are allowed.
@@ -350,7 +350,7 @@ def test_where_walls_may_be_straight_half_of_such_rooms_are_less_uneven_than_is_
     assert length == 0.10
 
 
-def test_where_no_wall_was_seen_nothing_is_reckoned_with():
+def test_where_no_wall_was_seen_nothing_is_assumed():
     assert overlooked(Interval(0.0, 0.0, 0.0))[0] < 1e-6
 
 
@@ -370,7 +370,7 @@ def test_words_say_what_cannot_be_told():
     found = calibrate(narrow_view())
     bearing, straight, bias, alignment = report(found).remarks
     assert "may as well be straight" in straight
-    assert f"{1e3 * found.noise.unevenness:.1f} mm are reckoned with" in straight
+    assert f"{1e3 * found.noise.unevenness:.1f} mm are assumed" in straight
     assert "The bearing noise cannot be determined here (at most" in bearing
     assert "cannot be determined" in bias
     assert "cannot be determined" in alignment

@@ -80,12 +80,12 @@ def _best(by_length: list[list["_Known"]], products: list[Array]) -> Ints:
 
 
 def usual(size: Interval, length: Interval) -> tuple[float, float]:
-    """Size and length (m) to reckon with: what few walls say, drawn to what rooms have by how little it is known."""
+    """Size and length (m) to assume: what few walls say, drawn to what rooms have by how little it is known."""
     return _drawn_to(size, _SIZE_PRIOR)[0], _drawn_to(length, _LENGTH_PRIOR)[0]
 
 
 def overlooked(size: Interval) -> tuple[float, float]:
-    """Size and length (m) to reckon with where walls may as well be straight, for all that is known.
+    """Size and length (m) to assume where walls may as well be straight, for all that is known.
 
     The median of what rooms have, of all that is at most the upper end of the interval: a few walls that look straight
     do not say that they are, many that are seen well do.
