@@ -1,7 +1,6 @@
 """The map of a building from whole scans, live or from a recording."""
 
 from dataclasses import dataclass
-from types import TracebackType
 
 import numpy as np
 
@@ -9,8 +8,7 @@ from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, inverse, relative
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Refined
-from lidarcore.mapping.live.worker import Worker
-from lidarcore.mapping.loops.back import BackEnd, Snapshot
+from lidarcore.mapping.loops.back import BackEnd
 from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.keyframes import Keyframes
 from lidarcore.mapping.matching.front import FrontEnd
@@ -19,9 +17,6 @@ from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
 
-_BEHIND = (
-    20  # keyframes that wait from which on loops are left for later: the map keeps up, and is bent at the end
-)
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 
 
@@ -46,20 +41,16 @@ class Placement:
 class Mapper:
     """Takes scans one by one. Odometry is used where scans have it, else the motion is taken to go on.
 
-        mapper = Mapper()
-        for scan in open_recording(path):
-            mapper.step(scan)
-        mapper.finish()
-        stamps, poses = mapper.trajectory()
-
-    background  loops are found in a thread of its own: `step` never waits for them, and corrections arrive later.
-                Use the mapper as a context manager then, or call `close`.
+    mapper = Mapper()
+    for scan in open_recording(path):
+        mapper.step(scan)
+    mapper.finish()
+    stamps, poses = mapper.trajectory()
     """
 
-    def __init__(self, settings: MapperSettings | None = None, background: bool = False) -> None:
+    def __init__(self, settings: MapperSettings | None = None) -> None:
         self._settings = settings or MapperSettings()
         self._front, self._back = FrontEnd(self._settings.front), BackEnd(self._settings)
-        self._worker = Worker(self._add, "mapper") if background else None
         self._stamps: list[float] = []
         self._ties: list[tuple[int, UncertainPose]] = []
         self._motions: list[ScanMotion] = []
@@ -67,20 +58,6 @@ class Mapper:
         self._locals: list[Array] = []  # T_local_keyframe, in the front end's frame
         self._loops = 0
         self._refined: Refined | None = None
-
-    def __enter__(self) -> "Mapper":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """End the thread; the map stays as it is."""
-        if self._worker is not None:
-            self._worker.close()
-            self._worker = None
 
     def step(self, scan: Scan) -> Placement:
         """Place a scan. Raises MotionError if the clock went back or odometry jumped; nothing has changed then."""
@@ -92,31 +69,24 @@ class Mapper:
             self._numbers.append(len(self._ties))
             self._locals.append(local)
             self._refined = None
-            if self._worker is None:
-                self._back.add(tracked)
-            else:
-                self._worker.put(tracked)
+            self._back.add(tracked)
         if tracked.first is not None:
             self._motions[0] = _motion_of(tracked.first)
         self._motions.append(_motion_of(tracked))
         self._stamps.append(tracked.stamp)
         self._ties.append(tie)
-        snapshot = self._back.snapshot
-        closed, self._loops = len(snapshot.loops) - self._loops, len(snapshot.loops)
-        pose = compose(self._correction(snapshot), local)
+        closed, self._loops = len(self._back.loops) - self._loops, len(self._back.loops)
+        pose = compose(self._correction, local)
         return Placement(tracked.stamp, pose, tie[0], tracked.on, closed)
 
     def finish(self) -> None:
         """Look for loops once more, now that all scans are there, and adjust all keyframes at once."""
         if not self._numbers:
             return
-        if self._worker is not None:
-            self._worker.join()
-        with self._back.lock:
-            self._smooth_motion()
-            if self._back.search_again():
-                self._back.search_again()
-            self._refined = self._back.refine()
+        self._smooth_motion()
+        if self._back.search_again():
+            self._back.search_again()
+        self._refined = self._back.refine()
         self._loops = len(self._back.loops)
 
     def _smooth_motion(self) -> None:
@@ -138,41 +108,30 @@ class Mapper:
     @property
     def loops(self) -> tuple[Loop, ...]:
         """The loops that were believed, between keyframes."""
-        return self._back.snapshot.loops
-
-    @property
-    def snapshot(self) -> Snapshot:
-        """The keyframes that have reached the map, and their poses; at once."""
-        return self._back.snapshot
+        return tuple(self._back.loops)
 
     @property
     def keyframes(self) -> Keyframes:
         """The scans that make the map, their poses and covariances; takes a while."""
-        with self._back.lock:
-            snapshot, known = self._back.snapshot, self._known
-            covariances = known.covariances()[: len(snapshot.poses)]
-        scans = tuple(keyframe.scan for keyframe in snapshot.keyframes)
-        return Keyframes(np.array(self._numbers[: len(scans)], np.int64), scans, snapshot.poses, covariances)
+        scans = tuple(keyframe.scan for keyframe in self._back.keyframes.values())
+        return Keyframes(
+            np.array(self._numbers, np.int64), scans, self._poses, self._known.covariances()[: len(scans)]
+        )
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j of keyframes i and j with its covariance."""
-        with self._back.lock:
-            return self._known.relative(i, j)
+        return self._known.relative(i, j)
 
     def trajectory(self) -> tuple[Array, Array]:
         """Stamps (T,) s and poses (T, 3), T_map_sensor, of all scans as the map has them now."""
-        snapshot, stamps = self._back.snapshot, np.array(self._stamps, np.float64)
+        stamps = np.array(self._stamps, np.float64)
         if not len(stamps):
             return stamps, np.empty((0, 3))
-        late = np.array(self._locals[len(snapshot.poses) :]).reshape(-1, 3)
-        poses = np.concatenate([snapshot.poses, compose(self._correction(snapshot), late)])
         nodes = np.array([node for node, _ in self._ties], np.int64)
-        return stamps, compose(poses[nodes], np.array([tie.pose for _, tie in self._ties]))
+        return stamps, compose(self._poses[nodes], np.array([tie.pose for _, tie in self._ties]))
 
     def covariances(self) -> Array:
-        """(T, 3, 3) of the poses that `trajectory` gives, once all keyframes have reached the map."""
-        if self._worker is not None:
-            self._worker.join()
+        """(T, 3, 3) of the poses that `trajectory` gives."""
         found = self.keyframes
         placed = [
             UncertainPose(found.poses[node], found.covariances[node]).compose(tie).covariance
@@ -184,14 +143,15 @@ class Mapper:
     def _known(self) -> Refined | PoseGraph:
         return self._back.graph if self._refined is None else self._refined
 
-    def _add(self, tracked: Tracked | None, waiting: int) -> None:
-        if tracked is not None:
-            self._back.add(tracked, search=waiting <= _BEHIND)
+    @property
+    def _poses(self) -> Array:
+        """(K, 3) of the keyframes."""
+        return self._back.graph.poses[: len(self._numbers)]
 
-    def _correction(self, snapshot: Snapshot) -> Array:
-        """T_map_local (3,) by the newest keyframe that has reached the map."""
-        known = len(snapshot.poses)
-        return compose(snapshot.poses[-1], inverse(self._locals[known - 1])) if known else np.zeros(3)
+    @property
+    def _correction(self) -> Array:
+        """T_map_local (3,) by the newest keyframe."""
+        return compose(self._back.graph.poses[-1], inverse(self._locals[-1]))
 
 
 def _motion_of(tracked: Tracked) -> ScanMotion:

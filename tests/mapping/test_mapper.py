@@ -1,6 +1,5 @@
 """The mapper around a simulated building, with odometry whose noise is known, and without any."""
 
-import threading
 from dataclasses import replace
 from itertools import islice, pairwise
 
@@ -108,38 +107,6 @@ def test_the_trajectory_has_every_scan_with_its_stamp():
     assert all(b > a for a, b in pairwise(stamps))
     np.testing.assert_allclose(poses[-1], placement.pose)
     assert np.linalg.eigvalsh(mapper.covariances()[1:]).min() > 0
-
-
-def test_in_the_background_the_map_becomes_the_same_and_the_thread_ends():
-    scans = drive(way(0.5, 1.1), np.random.default_rng(9))
-    alone, _ = mapped(scans)
-    before = threading.active_count()
-    with Mapper(SETTINGS, background=True) as mapper:
-        placements = [mapper.step(scan) for scan in scans]
-        assert threading.active_count() == before + 1
-        mapper.finish()
-    assert threading.active_count() == before
-    assert [placement.connected for placement in placements] == [True] * len(scans)
-    np.testing.assert_allclose(mapper.trajectory()[1], alone.trajectory()[1], atol=0.02)
-    assert len(mapper.keyframes.scans) == len(alone.keyframes.scans)
-
-
-def test_what_ends_the_thread_is_told_to_whoever_brings_scans(monkeypatch):
-    scans = drive(way(0.5, 0.2), np.random.default_rng(10))
-
-    def broken(*_):
-        raise ZeroDivisionError
-
-    def go_on():
-        for scan in scans[1:4]:
-            mapper.step(scan)
-        mapper.finish()
-
-    with Mapper(SETTINGS, background=True) as mapper:
-        mapper.step(scans[0])
-        monkeypatch.setattr("lidarcore.mapping.loops.back.compose", broken)
-        with pytest.raises(ZeroDivisionError):
-            go_on()
 
 
 @pytest.mark.parametrize("odometry", [True, False])

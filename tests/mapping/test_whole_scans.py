@@ -1,5 +1,6 @@
 """SLAM from whole scans while it runs: a simulated robot that knows its true poses."""
 
+import time
 from collections.abc import Iterator
 from itertools import islice
 
@@ -56,6 +57,16 @@ def test_a_robot_that_drives_through_two_rooms_is_tracked_all_the_way(
     print(error, np.sqrt(np.diag(last.covariance)))
     assert np.hypot(*error[:2]) < 0.1
     assert error @ np.linalg.solve(last.covariance, error) < chi2.isf(1e-6, 3)
+
+
+def test_a_map_whose_first_scan_is_long_in_coming_has_it_all_the_same(
+    slam: WholeScans, drive: list[Scan], caplog: pytest.LogCaptureFixture
+) -> None:
+    """The thread of the map looks for something to draw once a second."""
+    time.sleep(1.5)
+    slam.step(slam.deskewed(drive[0]))
+    wait_until(lambda: slam.picture is not None)
+    assert caplog.records == []
 
 
 def test_a_sensor_at_rest_stays_there_where_its_scans_arrive_late(slam: WholeScans) -> None:

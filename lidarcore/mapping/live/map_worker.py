@@ -92,7 +92,8 @@ class MapWorker:
     def _step(self, tracked: Tracked | None) -> None:
         if tracked is not None:
             self._add(tracked)
-        if len(self._drawn) < len(self._back.graph) and time.monotonic() >= self._next_picture:
+        lacks = self._back.keyframes and len(self._drawn) < len(self._back.graph)
+        if lacks and time.monotonic() >= self._next_picture:
             self._draw()
 
     def _add(self, tracked: Tracked) -> None:

@@ -23,7 +23,7 @@ class Worker(Generic[Item]):
         self._idle = idle
         self._queue: deque[Item] = deque()
         self._filled = threading.Condition()
-        self._closing = self._busy = False
+        self._closing = False
         self._failure: BaseException | None = None
         # The job may hold the worker: only the thread holds the job, so that both are freed as soon as it has ended.
         self._thread = threading.Thread(target=self._run, args=(job,), name=name, daemon=True)
@@ -40,12 +40,6 @@ class Worker(Generic[Item]):
         with self._filled:
             self._queue.append(item)
             self._filled.notify_all()
-
-    def join(self) -> None:
-        """Wait until all items are done. Raises what ended the thread, if anything did."""
-        with self._filled:
-            self._filled.wait_for(lambda: self._failure or not (self._queue or self._busy))
-        self._check()
 
     def end(self) -> None:
         """End after the item at hand; returns at once."""
@@ -67,18 +61,13 @@ class Worker(Generic[Item]):
             while self._next(job):
                 pass
         except BaseException as failure:  # told to whoever brings the next item
-            with self._filled:
-                self._failure = failure
-                self._filled.notify_all()
+            self._failure = failure
 
     def _next(self, job: Callable[[Item | None, int], None]) -> bool:
         with self._filled:
-            self._busy = False
-            self._filled.notify_all()
             self._filled.wait_for(lambda: self._queue or self._closing, self._idle)
             if self._closing:
                 return False
-            self._busy = True
             item = self._queue.popleft() if self._queue else None
             waiting = len(self._queue)
         job(item, waiting)

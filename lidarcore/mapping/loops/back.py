@@ -1,8 +1,5 @@
 """The back end: keyframes become nodes of a pose graph, loops bend it."""
 
-import threading
-from typing import NamedTuple
-
 import numpy as np
 
 from lidarcore.arrays import Array
@@ -25,19 +22,9 @@ _FOUND = np.diag([0.05, 0.05, 0.02]) ** 2  # how well it is known where an islan
 _SETTLED = 0.01  # m and rad of the last step, after which the poses are far better than that
 
 
-class Snapshot(NamedTuple):
-    """The map as it was after a keyframe: K keyframes, their poses (K, 3), and the loops believed; never changed."""
-
-    keyframes: tuple[Keyframe, ...]
-    poses: Array
-    loops: tuple[Loop, ...]
-
-
 class BackEnd:
     """A pose graph of keyframes that closes loops.
 
-    lock       held while keyframes are added; what does not hold it may read the snapshot only
-    snapshot   the map after the last keyframe
     graph      PoseGraph of the keyframes
     keyframes  by their nodes, in the order of time; `thin` leaves some nodes without
     loops      the loops that were believed
@@ -46,8 +33,6 @@ class BackEnd:
 
     def __init__(self, settings: MapperSettings) -> None:
         self._settings = settings
-        self.lock = threading.Lock()
-        self.snapshot = Snapshot((), np.empty((0, 3)), ())
         self.graph = PoseGraph()
         self.loops: list[Loop] = []
         self.keyframes: dict[int, Keyframe] = {}
@@ -55,35 +40,28 @@ class BackEnd:
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
 
-    def add(self, tracked: Tracked, search: bool = True) -> None:
-        """Append a keyframe, and bend the map if it closes loops; search=False leaves them for later."""
-        keyframe = _keyframe(tracked)
-        with self.lock:
-            if tracked.first is not None:
-                self.keyframes[0] = _keyframe(tracked.first)
-            self._add(tracked, keyframe, search)
-            self.snapshot = Snapshot(tuple(self.keyframes.values()), self.graph.poses, tuple(self.loops))
+    def add(self, tracked: Tracked) -> None:
+        """Append a keyframe, and bend the map if it closes loops."""
+        if tracked.first is not None:
+            self.keyframes[0] = _keyframe(tracked.first)
+        if not self.keyframes:
+            self.keyframes[0] = _keyframe(tracked)
+            return
+        pose, P = tracked.tie
+        node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
+        self.keyframes[node] = _keyframe(tracked)
+        self.steps.append(Step(tracked.node, node, *tracked.moved))
+        self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
+        if tracked.island:
+            self._islands.begin(node)
+        self._join(node)
+        self._close(self._finder.find(node))
 
     def thin(self) -> None:
         """Let go of the scans that say what others say too; their nodes stay. A map that was thinned is not refined."""
         nodes = np.array(list(self.keyframes), np.int64)
         for node in spare(nodes, self.graph.poses[nodes]).tolist():
             del self.keyframes[node]
-
-    def _add(self, tracked: Tracked, keyframe: Keyframe, search: bool) -> None:
-        if not self.keyframes:
-            self.keyframes[0] = keyframe
-            return
-        pose, P = tracked.tie
-        node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
-        self.keyframes[node] = keyframe
-        self.steps.append(Step(tracked.node, node, *tracked.moved))
-        self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
-        if tracked.island:
-            self._islands.begin(node)
-        if search:
-            self._join(node)
-            self._close(self._finder.find(node))
 
     def search_again(self) -> int:
         """Look for loops at all keyframes, now that the map is better. Returns how many were closed."""
@@ -115,7 +93,6 @@ class BackEnd:
         )
         self.graph.move(refined.poses)
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
-        self.snapshot = Snapshot(tuple(self.keyframes.values()), refined.poses, tuple(self.loops))
         return refined
 
     def _join(self, k: int) -> int:
