@@ -22,28 +22,26 @@ class MatchSettings:
     """How two scans are matched to each other. Immutable; pydantic.ValidationError names a wrong field."""
 
     noise: SensorNoise = field(default_factory=SensorNoise)
-    radius: Annotated[
-        float, number(0.02, 2, "m", "points this near on the same surface make the line of a point")
-    ] = 0.3
-    gap: Annotated[
-        float, number(0.02, 5, "m", "a surface ends where neighbouring points are farther apart")
-    ] = 0.5
-    patch: Annotated[
-        float, number(0.01, 1, "m", "length of the patches that a scan's surfaces are cut into")
-    ] = 0.1
-    unevenness: Annotated[
-        float, number(0, 0.2, "m", "standard deviation of a patch from where its wall is, beside noise")
-    ] = 0.005
-    reach: Annotated[
-        float, number(0.02, 2, "m", "farthest point of the reference that a point is taken for")
-    ] = 0.3
-    cell: Annotated[float, number(0.01, 0.5, "m", "grid in which the coarse match is sought")] = 0.05
-    blur: Annotated[float, number(0.01, 1, "m", "by which the coarse match blurs the reference")] = 0.1
-    horizon: Annotated[float, number(1, 50, "m", "the coarse match leaves out what is farther away")] = 12.0
-    max_shift: Annotated[float, number(0, 30, "m", "the coarse match never looks farther than this")] = 10.0
-    max_turn: Annotated[float, number(0, 3.15, "rad", "the coarse match never turns by more than this")] = (
-        3.15
+    radius: float = number(
+        0.02, 2, "m", "points this near on the same surface make the line of a point", default=0.3
     )
+    gap: float = number(
+        0.02, 5, "m", "a surface ends where neighbouring points are farther apart", default=0.5
+    )
+    patch: float = number(
+        0.01, 1, "m", "length of the patches that a scan's surfaces are cut into", default=0.1
+    )
+    unevenness: float = number(
+        0, 0.2, "m", "standard deviation of a patch from where its wall is, beside noise", default=0.005
+    )
+    reach: float = number(
+        0.02, 2, "m", "farthest point of the reference that a point is taken for", default=0.3
+    )
+    cell: float = number(0.01, 0.5, "m", "grid in which the coarse match is sought", default=0.05)
+    blur: float = number(0.01, 1, "m", "by which the coarse match blurs the reference", default=0.1)
+    horizon: float = number(1, 50, "m", "the coarse match leaves out what is farther away", default=12.0)
+    max_shift: float = number(0, 30, "m", "the coarse match never looks farther than this", default=10.0)
+    max_turn: float = number(0, 3.15, "rad", "the coarse match never turns by more than this", default=3.15)
 
 
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
@@ -56,38 +54,42 @@ class FrontSettings:
             along=0.1, across=0.1, heading_per_metre=0.1, heading_per_radian=0.15, slip_per_radian=0.05
         )
     )
-    speed_change: Annotated[
-        float,
-        number(0.01, 50, "m/s", "standard deviation of the speed's change between two scans, a second apart"),
-    ] = 0.5
-    turn_change: Annotated[
-        float, number(0.01, 50, "rad/s", "standard deviation of the turn rate's change, the same")
-    ] = 1.0
-    keyframe_distance: Annotated[
-        float, number(0, 10, "m", "a scan this far from the last keyframe is one")
-    ] = 0.3
-    keyframe_turn: Annotated[float, number(0, 3.15, "rad", "a scan turned this much is a keyframe")] = 0.26
+    speed_change: float = number(
+        0.01,
+        50,
+        "m/s",
+        "standard deviation of the speed's change between two scans, a second apart",
+        default=0.5,
+    )
+    turn_change: float = number(
+        0.01, 50, "rad/s", "standard deviation of the turn rate's change, the same", default=1.0
+    )
+    keyframe_distance: float = number(
+        0, 10, "m", "a scan this far from the last keyframe is one", default=0.3
+    )
+    keyframe_turn: float = number(0, 3.15, "rad", "a scan turned this much is a keyframe", default=0.26)
     keyframes: Annotated[int, Field(ge=1, le=100, description="last keyframes that make the local map")] = 10
-    inliers: Annotated[
-        float, number(0.05, 1, "", "share of a scan that must lie on the local map to be tied to it")
-    ] = 0.15
-    max_step: Annotated[
-        float,
-        number(
-            0.1, 100, "m", "odometry that moves farther within a second, or from scan to scan, has jumped"
-        ),
-    ] = 5.0
+    inliers: float = number(
+        0.05, 1, "", "share of a scan that must lie on the local map to be tied to it", default=0.15
+    )
+    max_step: float = number(
+        0.1,
+        100,
+        "m",
+        "odometry that moves farther within a second, or from scan to scan, has jumped",
+        default=5.0,
+    )
 
 
 @dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
 class LoopSettings:
     """When a scan is tied to an earlier place."""
 
-    distance: Annotated[float, number(0.5, 30, "m", "earlier places this near are looked at")] = 4.0
-    sigmas: Annotated[
-        float, number(0, 10, "", "standard deviations by which places may be farther, and stretches longer")
-    ] = 2.5
-    farthest: Annotated[float, number(1, 100, "m", "no earlier place is farther than this")] = 20.0
+    distance: float = number(0.5, 30, "m", "earlier places this near are looked at", default=4.0)
+    sigmas: float = number(
+        0, 10, "", "standard deviations by which places may be farther, and stretches longer", default=2.5
+    )
+    farthest: float = number(1, 100, "m", "no earlier place is farther than this", default=20.0)
     apart: Annotated[int, Field(ge=1, le=1000, description="keyframes between two that make a loop")] = 10
     before: Annotated[
         int, Field(ge=0, le=20, description="keyframes before one that are matched with it")
@@ -95,30 +97,28 @@ class LoopSettings:
     places: Annotated[
         int, Field(ge=1, le=50, description="passes that one scan is matched with, at most")
     ] = 4
-    overlap: Annotated[
-        float, number(0.1, 1, "", "share of the scan that the earlier one should have seen")
-    ] = 0.4
-    inliers: Annotated[float, number(0.1, 1, "", "share of the scan that must lie on the earlier one")] = 0.5
-    conflicts: Annotated[
-        float, number(0, 1, "", "share of either scan that may lie where the other one looked through")
-    ] = 0.1
-    gate: Annotated[
-        float, number(0.5, 0.99999, "", "share of the true loops that the chi-square gate lets through")
-    ] = 0.999
-    floor_distance: Annotated[float, number(1e-4, 1, "m", "no loop is known better than this")] = 0.01
-    floor_turn: Annotated[float, number(1e-5, 1, "rad", "no loop is known better than this")] = 0.003
+    overlap: float = number(
+        0.1, 1, "", "share of the scan that the earlier one should have seen", default=0.4
+    )
+    inliers: float = number(0.1, 1, "", "share of the scan that must lie on the earlier one", default=0.5)
+    conflicts: float = number(
+        0, 1, "", "share of either scan that may lie where the other one looked through", default=0.1
+    )
+    gate: float = number(
+        0.5, 0.99999, "", "share of the true loops that the chi-square gate lets through", default=0.999
+    )
+    floor_distance: float = number(1e-4, 1, "m", "no loop is known better than this", default=0.01)
+    floor_turn: float = number(1e-5, 1, "rad", "no loop is known better than this", default=0.003)
     support: Annotated[
         int,
         Field(ge=2, le=20, description="nodes with loops that agree where the map is too vague to judge one"),
     ] = 3
-    shortest: Annotated[float, number(0, 100, "m", "way along which such loops agree, at least")] = 3.0
-    longest: Annotated[float, number(0, 100, "m", "way that is enough however vague the map is")] = 12.0
-    rivals: Annotated[
-        float, number(0, 1, "", "share of their support that loops which contradict them may have")
-    ] = 0.7
-    memory: Annotated[float, number(1, 1000, "m", "way for which a loop waits for others to agree with")] = (
-        20.0
+    shortest: float = number(0, 100, "m", "way along which such loops agree, at least", default=3.0)
+    longest: float = number(0, 100, "m", "way that is enough however vague the map is", default=12.0)
+    rivals: float = number(
+        0, 1, "", "share of their support that loops which contradict them may have", default=0.7
     )
+    memory: float = number(1, 1000, "m", "way for which a loop waits for others to agree with", default=20.0)
 
     @property
     def floor(self) -> Array:
@@ -137,14 +137,13 @@ class MapperSettings:
 
     front: FrontSettings = field(default_factory=FrontSettings)
     loops: LoopSettings = field(default_factory=LoopSettings)
-    cell: Annotated[
-        float,
-        number(0.1, 5, "m", "length of the surfaces that are taken for straight when a map is finished"),
-    ] = 0.5
-    drift: Annotated[
-        float, number(0, 1, "m", "standard deviation that a step from keyframe to keyframe has beside noise")
-    ] = 0.01
-    drift_turn: Annotated[float, number(0, 1, "rad", "the same of its heading")] = 0.002
+    cell: float = number(
+        0.1, 5, "m", "length of the surfaces that are taken for straight when a map is finished", default=0.5
+    )
+    drift: float = number(
+        0, 1, "m", "standard deviation that a step from keyframe to keyframe has beside noise", default=0.01
+    )
+    drift_turn: float = number(0, 1, "rad", "the same of its heading", default=0.002)
 
     @property
     def drift_covariance(self) -> Array:

@@ -17,7 +17,7 @@ const MEANING = {
   "too small": "they are too small and claim too much certainty",
   true: "they match the scatter and can be trusted",
   "too large": "they are too large and claim too little certainty",
-  open: "too few observations yet to judge them",
+  open: "the scatter does not tell yet whether they are true",
 };
 
 const NOISE = { "too small": "more", "too large": "less" };

@@ -29,7 +29,7 @@ def verdict(judgement: Judgement) -> Verdict | None:
     Open, too, if the two are wrong in opposite ways (`has_other_tails`).
 
     With few sightings only the 50 % ellipses can tell that ellipses are too large: those of 95 % miss 5 in 100 at best.
-    None where nothing is known. A study's `consistency_verdicts.verdict` asks for more, as it has more trials.
+    None where nothing is known. A study's `consistency.verdicts.verdict` asks for more, as it has more trials.
     """
     held = judgement.coverage_95
     if held.value != held.value:

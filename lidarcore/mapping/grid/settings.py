@@ -15,18 +15,19 @@ class GridSettings:
     With the defaults a cell takes nine scans that look through it to become free after it was occupied for good.
     """
 
-    resolution: Annotated[float, number(0.005, 5.0, "m", "side of a cell")] = 0.05
-    hit: Annotated[float, number(0.05, 5.0, "", "log-odds that a return adds to its cell")] = 0.85
-    miss: Annotated[float, number(0.05, 5.0, "", "log-odds that a ray takes from a cell it goes through")] = (
-        0.4
+    resolution: float = number(0.005, 5.0, "m", "side of a cell", default=0.05)
+    hit: float = number(0.05, 5.0, "", "log-odds that a return adds to its cell", default=0.85)
+    miss: float = number(0.05, 5.0, "", "log-odds that a ray takes from a cell it goes through", default=0.4)
+    miss_beside_hit: float = number(
+        0.05,
+        5.0,
+        "",
+        "the same of a cell beside one that the scan hits: the pose may be a cell off",
+        default=0.1,
     )
-    miss_beside_hit: Annotated[
-        float,
-        number(0.05, 5.0, "", "the same of a cell beside one that the scan hits: the pose may be a cell off"),
-    ] = 0.1
-    most: Annotated[float, number(0.1, 6.0, "", "bound of the log-odds of an occupied cell")] = 3.5
-    least: Annotated[float, number(0.1, 6.0, "", "bound of the log-odds of a free cell, below zero")] = 2.0
-    max_range: Annotated[float, number(0.5, 1000.0, "m", "returns from farther away are left out")] = 80.0
+    most: float = number(0.1, 6.0, "", "bound of the log-odds of an occupied cell", default=3.5)
+    least: float = number(0.1, 6.0, "", "bound of the log-odds of a free cell, below zero", default=2.0)
+    max_range: float = number(0.5, 1000.0, "m", "returns from farther away are left out", default=80.0)
     most_cells: Annotated[
         int, Field(ge=1, le=1_000_000_000, description="a grid that would need more is refused")
     ] = 100_000_000

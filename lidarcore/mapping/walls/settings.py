@@ -12,25 +12,24 @@ from lidarcore.fields import number
 class WallSettings:
     """How the segments of many scans become walls."""
 
-    distance: Annotated[
-        float,
-        number(
-            0.005, 1.0, "m", "a segment belongs to a wall if both its ends are this close to the wall's line"
-        ),
-    ] = 0.06
-    gap: Annotated[float, number(0.02, 5.0, "m", "a wall ends where it was not seen over more than this")] = (
-        0.35
+    distance: float = number(
+        0.005,
+        1.0,
+        "m",
+        "a segment belongs to a wall if both its ends are this close to the wall's line",
+        default=0.06,
     )
-    free_gap: Annotated[
-        float, number(0.02, 5.0, "m", "a wall ends where the grid is free over more than this")
-    ] = 0.2
-    corner_gap: Annotated[
-        float, number(0.01, 2.0, "m", "walls meet in a corner if their lines meet this close to their ends")
-    ] = 0.25
-    corner_angle: Annotated[
-        float, number(0.05, 1.57, "rad", "least angle between walls that make a corner")
-    ] = 0.35
-    min_length: Annotated[float, number(0.0, 10.0, "m", "shorter walls are left out")] = 0.2
+    gap: float = number(0.02, 5.0, "m", "a wall ends where it was not seen over more than this", default=0.35)
+    free_gap: float = number(
+        0.02, 5.0, "m", "a wall ends where the grid is free over more than this", default=0.2
+    )
+    corner_gap: float = number(
+        0.01, 2.0, "m", "walls meet in a corner if their lines meet this close to their ends", default=0.25
+    )
+    corner_angle: float = number(
+        0.05, 1.57, "rad", "least angle between walls that make a corner", default=0.35
+    )
+    min_length: float = number(0.0, 10.0, "m", "shorter walls are left out", default=0.2)
     min_count: Annotated[
         int, Field(ge=1, le=1000, description="a wall is seen from at least so many keyframes")
     ] = 1
