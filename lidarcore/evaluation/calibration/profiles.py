@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.evaluation.calibration.wall_beams import WallBeams, medians
-from lidarcore.scan import Array, Ints
 
 PROFILE_BIN = np.radians(0.5)  # of which the median over all scans is one point of a wall's profile
 _LEAST_POINTS = 8  # of a profile: a line takes two

@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from lidarcore.arrays import Array, Ints
 from lidarcore.evaluation.calibration.profiles import Profile, without_line
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.scan import Array, Ints
 
-_LENGTHS = np.geomspace(
-    0.01, 0.25, 25
-)  # m; what is alike over more is the shape of a wall, not its unevenness
+_LENGTHS = np.geomspace(0.01, 0.25, 25)  # m; what is alike over more is the shape of a wall
 _BETWEEN_LENGTHS = float(
     np.log(_LENGTHS[1] / _LENGTHS[0]) / np.sqrt(12)
 )  # error of what lies between two of them
@@ -37,25 +35,28 @@ def unevenness(walls: list[Profile], rng: np.random.Generator) -> tuple[Interval
     length = _length(by_length, rng)
     assumed, error = _drawn_to(length, _LENGTH_PRIOR)
     known = _at(by_length, assumed)
-    size = _of(known)
+    size = _size_seen(known)
     drawn = [wall.drawn(size, rng) for wall in known]
     sizes = _size(known, drawn)
     if np.quantile(sizes, 0.025) <= 0 or size <= 0:
         most = max(float(np.quantile(sizes, 0.975)), size)
         return Interval(size, 0.0, most), Interval(length.value, _LENGTHS[0], _LENGTHS[-1])
-    shorter, longer = (max(_of(_at(by_length, assumed * np.exp(by))), _SMOOTH) for by in (-error, error))
+    shorter, longer = (
+        max(_size_seen(_at(by_length, assumed * np.exp(by))), _SMOOTH) for by in (-error, error)
+    )
     parts = (_log_error(sizes), _between(known, drawn), float(np.log(longer / shorter)) / 2)
     return _around(size, float(np.linalg.norm(parts))), length
 
 
 def _without_unlike(by_length: list[list["_Known"]]) -> list[list["_Known"]]:
     """The walls for each length, without those much more uneven than most."""
-    own = np.array([_of([wall]) for wall in _at(by_length, _LENGTH_PRIOR[0])])
+    own = np.array([_size_seen([wall]) for wall in _at(by_length, _LENGTH_PRIOR[0])])
     alike = np.flatnonzero(own <= _UNLIKE * max(float(np.median(own)), _SMOOTH))
     return [[walls[i] for i in alike] for walls in by_length]
 
 
 def _at(by_length: list[list["_Known"]], length: float) -> list["_Known"]:
+    """The walls for the one of _LENGTHS that is nearest."""
     return by_length[int(np.abs(np.log(_LENGTHS / length)).argmin())]
 
 
@@ -67,7 +68,7 @@ def _length(by_length: list[list["_Known"]], rng: np.random.Generator) -> Interv
     found = _best(by_length, [wall.seen for wall in by_length[0]])
     value = float(_LENGTHS[found[0]])
     half_way = _at(by_length, float(np.sqrt(value * _LENGTH_PRIOR[0])))
-    size = max(_of(half_way), _SMOOTH)
+    size = max(_size_seen(half_way), _SMOOTH)
     draws = _LENGTHS[_best(by_length, [wall.drawn(size, rng) for wall in half_way])]
     return _around(value, float(np.hypot(_log_error(draws), _BETWEEN_LENGTHS)))
 
@@ -118,8 +119,8 @@ class _Known:
     """A profile of K points, and what an unevenness of one length would leave of it.
 
     line (K, 2), what a fitted line can be; covariance (K, K) of unevenness of variance 1; pairs (LAGS, K, K), which
-    points are how far apart; weight (LAGS,) of the mean products, shape (LAGS,), what unevenness of variance 1 leaves
-    of them beside a line, and noises (LAGS,), what the medians' noise does.
+    points are how far apart, and their numbers (LAGS,); shape (LAGS,), the mean products that unevenness of variance 1
+    leaves beside a line, and noises (LAGS,), what the medians' noise does.
     """
 
     wall: Profile
@@ -179,7 +180,8 @@ def _square(walls: list[_Known]) -> float:
     return sum(float(wall.weighted @ wall.shape) for wall in walls)
 
 
-def _of(walls: list[_Known]) -> float:
+def _size_seen(walls: list[_Known]) -> float:
+    """Size (m) that the walls themselves show."""
     return float(_size(walls, [wall.seen for wall in walls])[0])
 
 
