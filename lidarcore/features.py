@@ -13,7 +13,7 @@ import numpy as np
 
 from lidarcore import tables
 from lidarcore.lines import STATUS_MESSAGES, Lines
-from lidarcore.lines.line import normal_angle
+from lidarcore.lines.line import ABOUT_MEAN, ABOUT_TRUTH, normal_angle, to_second_order
 from lidarcore.scan import Array, Ints, Scan
 from lidarcore.settings import Covariance, ExtractionSettings
 
@@ -36,7 +36,11 @@ class _View:
 
 
 class Segments(_View):
-    """M wall segments in the order of the ring."""
+    """M wall segments in the order of the ring; uneven says whether the noise model knows that walls are."""
+
+    def __init__(self, table: Array, which: Covariance, uneven: bool) -> None:
+        super().__init__(table, which)
+        self._uneven = uneven
 
     @cached_property
     def lines(self) -> Lines:
@@ -44,9 +48,13 @@ class Segments(_View):
         published, consistent, for_maps = (
             self._matrices(c) for c in (tables.LINE_PUBLISHED, tables.LINE_CONSISTENT, tables.LINE_MAP)
         )
+        r = self._table[:, tables.DISTANCE]
+        if self._uneven:
+            consistent = to_second_order(consistent, r, ABOUT_MEAN)
+            for_maps = to_second_order(for_maps, r, ABOUT_TRUTH)
         return Lines(
             normal_angle(self._table[:, tables.NORMAL], self._table[:, tables.NORMAL + 1]),
-            self._table[:, tables.DISTANCE],
+            r,
             published,
             consistent,
             for_maps,
@@ -226,7 +234,7 @@ class Features:
         self.settings = settings
         self.fitter = fitter
         n, k, m = counts
-        self.segments = Segments(table[:n], settings.covariance)
+        self.segments = Segments(table[:n], settings.covariance, settings.noise.unevenness > 0)
         self.corners = Corners(table[n : n + k], settings.covariance)
         self.rejections = Rejections(table[::-1][:m], settings.covariance)
         self.noise_seen = noise_seen

@@ -13,7 +13,7 @@ from lidarcore.compiled import inlined, kernel
 from lidarcore.errors import DegenerateLineError, ScanError
 from lidarcore.lines import arras_siegwart, cwlf, ml, tls
 from lidarcore.lines.covariance import Free, covariances
-from lidarcore.lines.line import Line, Lines, normal_angle
+from lidarcore.lines.line import ABOUT_MEAN, ABOUT_TRUTH, Line, Lines, normal_angle, to_second_order
 from lidarcore.lines.regression import (
     BEYOND,
     LINE_CONSISTENT,
@@ -134,6 +134,9 @@ class Fitter:
         published, consistent, for_maps = (
             out[at : at + 4].reshape(2, 2) for at in (LINE_PUBLISHED, LINE_CONSISTENT, LINE_MAP)
         )
+        if noise.unevenness > 0:
+            consistent = to_second_order(consistent, out[2], ABOUT_MEAN)
+            for_maps = to_second_order(for_maps, out[2], ABOUT_TRUTH)
         return Line(alpha, float(out[2]), published, consistent, for_maps)
 
 

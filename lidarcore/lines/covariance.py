@@ -67,8 +67,7 @@ def covariances(
         here = _at_sensor(white, mean)
         return here, here
     pattern, elsewhere, roughness, off = _pattern(work, rho, c, s, noise, normal, (a0, mean, d), white, free)
-    anew = _plus(white, 1.0, pattern)
-    same = _plus(white, noise.resampling, elsewhere)
+    anew, same = _plus(white, 1.0, pattern), _plus(white, 1.0, elsewhere)
     repeated = _plus(_plus(_NOTHING, (1 - noise.renewal) * roughness, same), noise.renewal, anew)
     half, t_m = off
     tilt = noise.v_systematic / (half * half)
@@ -139,8 +138,8 @@ def _pattern(
     v_wall = (_PRIOR_WEIGHT * noise.v_wall + told * own) / (_PRIOR_WEIGHT + told)
     pattern = _gained(v_wall, k00, k01, k11, a0, d)
     elsewhere = pattern
-    if noise.renewal < 1 and noise.resampling > 0:
-        l00, l01, l11 = resampled_sums(w, t, decay, noise.length, free)
+    if noise.renewal < 1:
+        l00, l01, l11 = resampled_sums(w, t, decay, noise.length, noise.resampling, free)
         elsewhere = _gained(v_wall, l00, l01, l11, a0, d)
     roughness = max((steps * n / (n - 1) + _ROUGH_WEIGHT) / (n + _ROUGH_WEIGHT), _SMOOTHEST)
     return pattern, elsewhere, roughness, (np.abs(t[n - 1] - t[0]) / 2, (t[n - 1] + t[0]) / 2 + mean)
@@ -153,15 +152,18 @@ def _gained(v: float, k00: float, k01: float, k11: float, a0: float, d: float) -
 
 
 @inlined
-def resampled_sums(w: Array, t: Array, decay: Array, length: float, free: Free) -> tuple[float, float, float]:
-    """The sums of `unevenness_sums`, of what differs if all beams fall elsewhere between their neighbours.
+def resampled_sums(
+    w: Array, t: Array, decay: Array, length: float, resampling: float, free: Free
+) -> tuple[float, float, float]:
+    """The sums of `unevenness_sums`, of what differs if beams fall elsewhere, by `resampling`, and ends change.
 
     With a = spacing / (2 length), and a shift of all beams that is anywhere within the spacing, the covariance of two
     such samples of one wall is that of the process times sinh(a) / a, but (1 - exp(-a)) / a of a beam with itself. What
     they do not share, summed over the neighbours, is a variance of coth(a) - 1 / a for each beam, independent: a / 3
-    where beams are dense, which hardly miss anything between them, 1 where they are far apart. Such a shift also
-    brings a beam at either end or takes it away: it is counted as found anew, and at a free end the one beside it,
-    too. Where two walls meet, both of their lines say where they end, and no more than a beam changes sides.
+    where beams are dense, which hardly miss anything between them, 1 where they are far apart.
+    Wherever beams fall, noise brings one at either end or takes it away: it is counted as found anew, and at a free
+    end the one beside it, too. Where two walls meet, both of their lines say where they end, and no more than a beam
+    changes sides.
     """
     n = len(t)
     l00 = l01 = l11 = 0.0
@@ -169,7 +171,8 @@ def resampled_sums(w: Array, t: Array, decay: Array, length: float, free: Free) 
         before, after = max(i - 1, 0), min(i + 1, n - 1)
         a = np.abs(t[after] - t[before]) / ((after - before) * 2 * length)
         x = a * a
-        v = w[i] * w[i] * min(a * (35 + x) / (105 + 10 * x), 1.0)  # continued fraction of Langevin's function
+        langevin = min(a * (35 + x) / (105 + 10 * x), 1.0)  # a continued fraction
+        v = resampling * w[i] * w[i] * langevin
         l00 += v
         l01 += v * t[i]
         l11 += v * t[i] * t[i]

@@ -123,7 +123,7 @@ def test_what_shifted_beams_do_not_share_is_summed(spacing):
     shared = np.mean([np.exp(-np.abs(apart + shift) / length) for shift in shifts], axis=0)
     left = np.exp(-np.abs(apart) / length) - shared
     expected = [w @ left @ w, w @ left @ (w * t), (w * t) @ left @ (w * t)]
-    found = resampled_sums(w, t, np.empty(n), length, (True, True))
+    found = resampled_sums(w, t, np.empty(n), length, 1.0, (True, True))
     assert found[::2] == pytest.approx(expected[::2], rel=0.02)
 
 
@@ -224,3 +224,48 @@ def test_a_leg_before_the_wall_does_not_move_it():
         e = np.array([line.alpha - ALPHA, line.r - R])
         off[name] = np.sqrt(e @ np.linalg.solve(FITTERS["ml"].fit(*wall(80), told).covariance_consistent, e))
     assert off["robust"] < 2.4 < off["least squares"]
+
+
+@pytest.mark.parametrize("about", ["truth", "mean"])
+def test_a_short_wall_far_away_is_off_as_is_claimed(about):
+    """18 cm at 6 m, 4,000 times: a share of 0.93 is off by 0.022 with a probability below 1e-7.
+
+    A wall that turns by 57 mrad about its middle comes nearer by 9 mm, three times what its middle is off by. To first
+    order ellipses would hold 0.70 about the truth and 0.35 about the mean; as their errors are no Gaussian's, not 0.95.
+    """
+    rng, angles = np.random.default_rng(0), np.linspace(0.37, 0.405, 7)
+    t = 5.5 * np.tan(angles)
+    lines, covariances = np.empty((4000, 2)), np.empty((4000, 2, 2))
+    for i in range(4000):
+        seen = (5.5 + pattern(t, NOISE, rng)) / np.cos(angles)
+        v = NOISE.range_variances(seen) + (NOISE.sigma_bearing * t) ** 2
+        line = FITTERS["utls"].fit(seen + np.sqrt(v) * rng.standard_normal(7), ALPHA + angles, NOISE)
+        lines[i] = line.alpha, line.r
+        covariances[i] = line.covariance_map if about == "truth" else line.covariance_consistent
+    errors = lines - (lines.mean(0) if about == "mean" else (ALPHA, 5.5))
+    held = (squared_mahalanobis(errors, covariances) <= 5.991).mean()
+    assert 0.908 <= held <= 0.968
+
+
+def test_ends_that_change_are_claimed_on_fixed_bearings_too():
+    """100 short walls, 25 scans of each, on 15 bearings that are the same in every scan, or one fewer at either end.
+
+    If only beams that fall elsewhere were claimed, which none do here, ellipses would hold 0.77 of the scatter.
+    """
+    noise = replace(NOISE, sigma_range=0.001, sigma_bearing=5e-4, renewal=0.0)
+    rng, held = np.random.default_rng(5), 0
+    angles = np.linspace(-0.1, 0.3, 15)
+    t = R * np.tan(angles)
+    for _ in range(100):
+        ranges, fits = (R + pattern(t, noise, rng)) / np.cos(angles), []
+        v = noise.range_variances(ranges) + (noise.sigma_bearing * t) ** 2
+        for _ in range(25):
+            seen, some = (
+                ranges + np.sqrt(v) * rng.standard_normal(15),
+                slice(rng.integers(2), 15 - rng.integers(2)),
+            )
+            fits.append(FITTERS["ml"].fit(seen[some], ALPHA + angles[some], noise))
+        lines = np.array([[line.alpha, line.r] for line in fits])
+        for e, line in zip((lines - lines.mean(0)) / np.sqrt(1 - 1 / 25), fits, strict=True):
+            held += e @ np.linalg.solve(line.covariance_consistent, e) <= 5.991
+    assert held / 2500 >= 0.93
