@@ -19,7 +19,7 @@ def normal_angle(nx: ArrayLike, ny: ArrayLike) -> Array:
 ABOUT_TRUTH, ABOUT_MEAN = 3 / 4, 6 / 4
 
 
-def to_second_order(covariance: Array, r: ArrayLike, about: float) -> Array:
+def to_second_order(covariance: Array, r: Array | float, about: float) -> Array:
     """Covariance (..., 2, 2) of (alpha, r) of lines at r (...) m, from that to first order, with variance v of alpha.
 
     A line that turns by dalpha about a point of its wall comes nearer by r dalpha² / 2, whichever way it turns: on a

@@ -38,3 +38,23 @@ def test_of_beams_that_lie_far_apart_none_is_left_out() -> None:
 def test_where_every_beam_lies_beside_a_step_there_are_no_patches() -> None:
     bearings = np.linspace(-0.6, 0.6, 180)
     assert len(patches(Scan(np.where(np.arange(180) % 2, 2.0, 3.0), bearings), MATCH).means) == 0
+
+
+def test_walls_seen_at_a_slant_are_patches_as_far_as_beams_show_them_straight() -> None:
+    """A corridor 2.8 m wide: beside the sensor returns lie near each other, 6 m ahead every metre."""
+    bearings = np.deg2rad(np.arange(-90.0, 91.0))
+    with np.errstate(divide="ignore"):
+        ranges = np.minimum(1.4 / np.abs(np.sin(bearings)), 30.0 / np.cos(bearings))
+    seen = patches(Scan(ranges, bearings), MATCH)
+    side = np.abs(seen.normals[:, 1]) > 0.99
+    slanted = seen.counts == 0
+    np.testing.assert_allclose(np.abs(seen.means[side, 1]), 1.4, atol=1e-9)
+    assert (slanted & side & (seen.means[:, 0] > 6)).sum() >= 8
+    assert np.array_equal(seen.near.means, seen.means[~slanted])
+    assert seen.near.means[side[~slanted], 0].max() < 6
+
+
+def test_three_returns_that_lie_on_no_line_make_no_patch() -> None:
+    bearings = np.deg2rad(np.arange(-90.0, 91.0))
+    ranges = np.where(np.arange(181) % 2, 6.0, 7.0)  # pillars, each met by a single beam
+    assert len(patches(Scan(ranges, bearings), MATCH).means) == 0

@@ -34,7 +34,7 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
     )
     normals = np.array([act(np.array([0, 0, -poses[k, 2]]), np.array([0.0, -1.0])) for k in keyframes])
     variances = rng.uniform(0.5, 2, 9) * 1e-4
-    seen = Observations(keyframes, means, normals, variances)
+    seen = Observations(keyframes, means, normals, variances, np.ones(9, bool))
     sums, cells = normal_equations(seen, poses, np.zeros(len(poses), np.int64), 0.5, 2.0, 0.003)
     assert cells == 1
     weights = 1 / (2 * variances + 3 * 0.003**2)

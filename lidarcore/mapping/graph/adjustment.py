@@ -41,10 +41,12 @@ def normal_equations(
     arms, normals = (rotate(poses[seen.keyframes, 2], v) for v in (seen.means, seen.normals))
     places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
     order, starts = _ordered(places, normals, size, seen.keyframes)
-    turned = Observations(seen.keyframes[order], arms[order], normals[order], seen.variances[order])
+    turned = Observations(
+        seen.keyframes[order], arms[order], normals[order], seen.variances[order], seen.near[order]
+    )
     K, G = len(poses), len(order)
     sums = Sums(np.zeros((K, 3, 3)), np.zeros((K, 3)), np.empty((G, 3, 2)), np.empty((G, 2), np.int64))
-    groups = Groups(*np.empty((3, G)))
+    groups = Groups(*np.empty((4, G)))
     number, shared = sum_cells(turned, starts, poses, Noise(scale, unevenness**2), sums, groups)
     information = _sparse(sums.D, sums.U[:number], sums.at[:number], shared)
     return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups))), shared

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.compiled import kernel
 
 _TILT = 0.1  # rad by which the line of a cell may be turned from the mean of its normals
@@ -19,12 +19,14 @@ class Observations(NamedTuple):
     means      (M, 2) m, frame of the keyframe
     normals    (M, 2)
     variances  (M,) m² of noise
+    near       (M,) whether returns near each other make it, see Patches.counts
     """
 
     keyframes: Ints
     means: Array
     normals: Array
     variances: Array
+    near: Bools
 
 
 class Groups(NamedTuple):
@@ -33,11 +35,13 @@ class Groups(NamedTuple):
     squares    (G,) m² of the residual of their mean
     variances  (G,) m² of that mean by noise alone
     left       (G,) share of the square that the line did not take up
+    near       (G,) 1 where returns near each other make the first of its patches, else 0
     """
 
     squares: Array
     variances: Array
     left: Array
+    near: Array
 
 
 class Noise(NamedTuple):
@@ -112,7 +116,7 @@ def sum_cells(
             lever /= max(total, 1e-12)
             leverage = total * (N[1, 1] - 2 * N[0, 1] * lever + N[0, 0] * lever * lever) / det
             groups.squares[number], groups.variances[number] = (mean / information) ** 2, 1 / information
-            groups.left[number] = 1 - leverage
+            groups.left[number], groups.near[number] = 1 - leverage, turned.near[i]
             number += 1
             i = j
         lines += 1

@@ -119,7 +119,10 @@ def refine(
 def _observations(scans: list[Patches], assumed: float) -> Observations:
     """All patches, with the variance of noise alone: that of unevenness, m², is taken out."""
     numbers = np.repeat(np.arange(len(scans)), [len(scan.means) for scan in scans])
-    columns = zip(*((scan.means, scan.normals, scan.variances - assumed) for scan in scans), strict=True)
+    columns = zip(
+        *((scan.means, scan.normals, scan.variances - assumed, scan.counts > 0) for scan in scans),
+        strict=True,
+    )
     return Observations(numbers, *(np.concatenate(column) for column in columns))
 
 
@@ -148,7 +151,7 @@ def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> 
 def _measured(groups: Groups, cells: int, keyframes: int) -> tuple[float, float]:
     """Factor of the noise's variance, and the standard deviation of what a group shares, from their residuals."""
     free = 1 - 3 * keyframes / max(len(groups.squares) - 2 * cells, 3 * keyframes + 1)
-    kept = groups.left > 0.2
+    kept = (groups.left > 0.2) & (groups.near > 0)  # of the others' noise hardly anything is the ranges'
     squares, noise = groups.squares[kept] / (groups.left[kept] * max(free, 0.2)), groups.variances[kept]
     scale, shared = 1.0, 0.005**2
     for _ in range(10):

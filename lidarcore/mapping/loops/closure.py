@@ -47,16 +47,13 @@ class LoopFinder:
 
     def find(self, k: int) -> list[Loop]:
         """Loops to believe after node k came in; some of them may be of the nodes just before it."""
-        believed = []
+        believed: list[Loop] = []
         places = self._places(k)
         seen = self._submap(k, range(max(0, k - self._settings.before), k + 1)) if places else None
         for i, P in places:
             assert seen is not None
             for loop in self._hypotheses(i, k, P, seen):
-                if 3 * spread(P) < self._match_settings.reach:
-                    believed.append(loop)
-                else:
-                    self._waiting.append(loop)
+                (self._waiting if self._is_vague(P) else believed).append(loop)
         if self._waiting and self._waiting[-1].j == k:
             believed += self._agreeing(k)
         return believed
@@ -113,7 +110,7 @@ class LoopFinder:
         return [(i, P) for _, i, P in found[: settings.places]]
 
     def _best(self, run: Ints, k: int, P: Array) -> int | None:
-        """The node of a run that saw most of what node k sees; None if that is too little."""
+        """The node of a run that saw most of what node k sees, or the nearest that saw enough; None if none did."""
         poses, margin = self._graph.poses, _MARGIN + 2 * spread(P)
         few = run[:: max(1, len(run) // 12)]
         shares = [
@@ -122,13 +119,24 @@ class LoopFinder:
             )[0]
             for i in few
         ]
-        return int(few[np.argmax(shares)]) if max(shares) >= self._settings.overlap else None
+        enough = np.array(shares) >= self._settings.overlap
+        if not enough.any():
+            return None
+        if not self._is_vague(P):
+            return int(few[np.argmax(shares)])
+        # Seen from where the graph is vague, shares tell little more than that.
+        distances = np.hypot(*(poses[few, :2] - poses[k, :2]).T)
+        return int(few[np.argmin(np.where(enough, distances, np.inf))])
+
+    def _is_vague(self, P: Array) -> bool:
+        """Whether a pose with covariance P (3, 3) is known too little for its tie to be believed alone."""
+        return bool(3 * spread(P) >= self._match_settings.reach)
 
     def _submap(self, around: int, nodes: range) -> Patches:
         """What nodes saw together, seen from one of them."""
         kept = self._kept(np.array(nodes))
         poses = relative(self._graph.poses[around], self._graph.poses[kept])
-        return joined([placed(self._keyframes[n].patches, x) for n, x in zip(kept, poses, strict=True)])
+        return joined([placed(self._keyframes[n].patches.near, x) for n, x in zip(kept, poses, strict=True)])
 
     def _kept(self, nodes: Ints) -> Ints:
         """Those of the nodes whose scans are still there."""
@@ -146,7 +154,7 @@ class LoopFinder:
         first = self._registered(i, k, mean, P, reference, seen, np.empty((0, 3)))
         if first is None:
             return []
-        if 3 * spread(P) < match.reach:
+        if not self._is_vague(P):
             return [first]
         second = self._registered(i, k, mean, P, reference, seen, first.pose[None])
         if second is None or second.quality < _RIVAL * first.quality or self._same(first, second):
@@ -190,19 +198,32 @@ class LoopFinder:
         consistency = Consistency(self._graph, self._gate)
         sets = [consistency.agreeing(loop, self._waiting) for loop in new]
         best = max(sets, key=support)
-        P = self._graph.relative(best[0].i, k)[1]
-        stretch = np.clip(self._settings.sigmas * spread(P), *self._settings.stretch)
+        expected, P = self._graph.relative(best[0].i, k)
+        off = max(spread(P), float(np.hypot(*(best[0].pose - expected)[:2])))
+        stretch = np.clip(self._settings.sigmas * off, *self._settings.stretch)
         nodes = {loop.j for loop in best}
         if len(nodes) < self._settings.support or way[max(nodes)] - way[min(nodes)] < stretch:
             return []
         members = {id(loop) for loop in best}
-        others = [loop for loop in self._waiting if id(loop) not in members and loop.j in nodes]
+        others = [
+            loop for loop in self._waiting if id(loop) not in members and min(nodes) <= loop.j <= max(nodes)
+        ]
         against = [loop for loop in others if not any(consistency.agree(loop, b) for b in best)]
         rivals = [consistency.agreeing(loop, self._waiting) for loop in against]
-        if rivals and support(max(rivals, key=support)) > self._settings.rivals * support(best):
+        if any(support(rival) > self._settings.rivals * self._worth(best, rival) for rival in rivals):
             return []
         self._waiting = [loop for loop in self._waiting if id(loop) not in members]
         return best
+
+    def _worth(self, loops: list[Loop], rival: list[Loop]) -> float:
+        """The support of loops, less where the graph expects a rival rather than them."""
+        surprise, less = (self._surprise(several[0]) for several in (loops, rival))
+        return support(loops) * min(1.0, float(np.exp((less - surprise) / 2)))
+
+    def _surprise(self, loop: Loop) -> float:
+        """Squared Mahalanobis distance of a loop from what the graph expects."""
+        expected, P = self._graph.relative(loop.i, loop.j)
+        return squared(loop.pose, expected, loop.covariance + _CAUTION * P)
 
     def _way(self) -> Array:
         """Metres travelled to each node."""

@@ -69,11 +69,12 @@ class FrontEnd:
         tie = UncertainPose(matched.pose, matched.covariance + self._sweep.covariance)
         if rival is not None:
             tie = self._map.either(registered, rival)
-        island = len(seen.means) >= BLIND and not on and bool(tie.covariance[2, 2] > VAGUE**2)
+        is_blind = len(seen.near.means) < BLIND
+        island = not is_blind and not on and bool(tie.covariance[2, 2] > VAGUE**2)
         self._motion = relative(self._known.pose, tie.pose) if on else np.zeros(3)
         self._period += _SLOW * (dt - self._period)
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
-        leaves = island or (len(seen.means) >= BLIND and self._leaves(tie[0], registered.inliers))
+        leaves = island or (not is_blind and self._leaves(tie[0], registered.inliers))
         tracked = Tracked(
             scan.stamp, self._number - 1, tie, moved, on, scan, seen, self._sweep.covariance,
             self._sweep.removed, leaves, island, self._first if leaves else None,

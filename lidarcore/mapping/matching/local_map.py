@@ -51,9 +51,10 @@ class LocalMap:
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         prior = information_of(P)
         sigma = np.sqrt(np.diagonal(P))
-        far = arm(seen.means) if len(seen.means) else 0.0
+        near = seen.near.means
+        far = arm(near) if len(near) else 0.0
         registered = register(self._surfels, seen, x, x, prior, match.reach)
-        if len(seen.means) < BLIND:
+        if len(near) < BLIND:
             return registered
         is_vague = 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE
         if registered.inliers < SURE or (is_vague and registered.inliers + _BETTER < 1):
@@ -72,22 +73,24 @@ class LocalMap:
     ) -> Registration:
         """The better one of where the scan was registered and where a search finds it."""
         match = self._settings.match
-        start = search(self._surfels.means, seen.means, x, sigma, match)
+        reference, near = self._surfels.means[self._surfels.near], seen.near.means
+        start = search(reference, near, x, sigma, match)
         other = register(self._surfels, seen, start, x, prior, match.reach)
-        n = len(seen.means)
+        n = len(near)
         better = _worth(other, n, x, prior) > _worth(registered, n, x, prior) + _BETTER * n
         return other if better else registered
 
     def rival(self, seen: Patches, guess: UncertainPose, registered: Registration) -> Array | None:
         """Another pose (3,) at which a scan that fits badly fits nearly as well, if the guess leaves it open."""
-        if not self._settings.inliers <= registered.inliers < SURE or len(seen.means) < BLIND:
+        reference, near = self._surfels.means[self._surfels.near], seen.near.means
+        if not self._settings.inliers <= registered.inliers < SURE or len(near) < BLIND:
             return None
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         sigma, prior, besides = np.sqrt(np.diagonal(P)), information_of(P), registered.pose[None]
         if 3 * np.hypot(sigma[0], sigma[1]) < _WIDE:
             return None
         for _ in range(_RIVALS):
-            start = search(self._surfels.means, seen.means, x, sigma, match, besides)
+            start = search(reference, near, x, sigma, match, besides)
             other = register(self._surfels, seen, start, x, prior, match.reach)
             off = pose_difference(registered.pose, other.pose)
             if other.inliers >= _RIVAL * registered.inliers and (

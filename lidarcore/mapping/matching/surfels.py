@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.compiled import inlined, kernel
 from lidarcore.mapping.cells import cells
 from lidarcore.mapping.matching.patches import Patches
@@ -19,6 +19,7 @@ class Surfels(NamedTuple):
     means, normals  (M, 2)
     variances       (M,) m² of a mean along its normal
     tilts           (M,) rad² variance of the normal's direction
+    near            (M,) whether returns near each other make it, see Patches.counts
     low             (2,) m corner of the grid
     cell            m
     first           (W, H + 1) index of the first element of each cell; those of a column of cells follow each other
@@ -28,6 +29,7 @@ class Surfels(NamedTuple):
     normals: Array
     variances: Array
     tilts: Array
+    near: Bools
     low: Array
     cell: float
     first: Ints
@@ -47,10 +49,13 @@ def surfels(seen: Patches, size: float, cell: float) -> Surfels:
     total, tilt = of_cells(weights), of_cells(weights * seen.tilts)
     mean, normal = (of_cells(weights[:, None] * v) for v in (means, normals))
     length = np.hypot(*normal.T)
-    return _sorted(mean / total[:, None], normal / length[:, None], 1 / total, tilt / total / number, cell)
+    rows = mean / total[:, None], normal / length[:, None], 1 / total, tilt / total / number
+    return _sorted(*rows, of_cells(seen.counts) > 0, cell)
 
 
-def _sorted(means: Array, normals: Array, variances: Array, tilts: Array, cell: float) -> Surfels:
+def _sorted(
+    means: Array, normals: Array, variances: Array, tilts: Array, near: Bools, cell: float
+) -> Surfels:
     low = means.min(axis=0) - cell if len(means) else np.zeros(2)
     at = np.floor((means - low) / cell).astype(np.int64)
     shape = np.minimum(at.max(axis=0, initial=0) + 2, int(np.sqrt(_CELLS)))
@@ -59,7 +64,9 @@ def _sorted(means: Array, normals: Array, variances: Array, tilts: Array, cell: 
     order = kept[np.argsort(flat, kind="stable")]
     first = np.zeros((shape[0], shape[1] + 1), np.int64)
     _index(at[order], first)
-    return Surfels(means[order], normals[order], variances[order], tilts[order], low, cell, first)
+    return Surfels(
+        means[order], normals[order], variances[order], tilts[order], near[order], low, cell, first
+    )
 
 
 @kernel

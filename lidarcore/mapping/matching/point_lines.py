@@ -1,0 +1,99 @@
+"""Each point of a scan on the line of its neighbours, or, on a wall seen at a slant, of the two beams beside it."""
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.compiled import kernel
+
+LEAST = 3  # points that make a line
+MEAN, NORMAL, VARIANCE, TILT, COUNT, FIELDS = 0, 2, 4, 5, 6, 7
+"""Columns of a table of patches, and their number."""
+SLANTED = 0.0
+"""Instead of a count: the returns lie far apart, along a wall that is seen at a slant."""
+_FARTHEST = 3.0  # m between two of them
+_STRAIGHT = 9.0  # squared standard deviations by which the middle one of three is off their line, at most
+_RELIEF = 0.01  # m by which walls are off lines of that length
+
+
+@kernel
+def fit_lines(points: Array, ranges: Array, reaches: Array, gap: float, noise: Array, single: Array) -> None:
+    """Each point as a patch of its own: on the line of its neighbours, which it counts."""
+    for i in range(len(points)):
+        first, count = _neighbours(points, i, reaches[i] * reaches[i], max(gap, reaches[i]) ** 2)
+        _fit_line(points, i, first, count, noise, single[i])
+
+
+@kernel
+def _fit_line(points: Array, i: int, first: int, count: int, noise: Array, row: Array) -> None:
+    """Point i on the line of `count` points from the first on, around the ring."""
+    N, (px, py) = len(points), points[i]
+    x = y = xx = xy = yy = 0.0
+    for j in range(count):
+        k = first + j if first + j < N else first + j - N
+        u, v = points[k, 0] - px, points[k, 1] - py
+        x += u
+        y += v
+        xx += u * u
+        xy += u * v
+        yy += v * v
+    x, y = x / count, y / count
+    xx, xy, yy = xx / count - x * x, xy / count - x * y, yy / count - y * y
+    half, root = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    direction = np.arctan2(2 * xy, xx - yy) / 2
+    nx, ny = -np.sin(direction), np.cos(direction)
+    if nx * px + ny * py > 0:
+        nx, ny = -nx, -ny
+    square = px * px + py * py
+    across = (nx * px + ny * py) ** 2
+    variance = noise[0] * across / square + noise[1] * (square - across)
+    variance = max(variance, max(half - root, 0.0) * count / max(count - 2, 1))
+    row[MEAN], row[MEAN + 1], row[NORMAL], row[NORMAL + 1] = px, py, nx, ny
+    row[VARIANCE], row[TILT] = variance, variance / max(count * (half + root), 1e-9)
+    row[COUNT] = count
+
+
+@kernel
+def add_slanted(points: Array, bearings: Array, spacing: float, noise: Array, single: Array) -> None:
+    """Points on walls seen at such a slant that the next beams end far away: on the line of three, if they are on one.
+
+    They are what tells the heading in a corridor.
+    """
+    for i in range(1, len(points) - 1):
+        if single[i, COUNT] >= LEAST or bearings[i + 1] - bearings[i - 1] > 3 * spacing:
+            continue
+        ux, uy = points[i, 0] - points[i - 1, 0], points[i, 1] - points[i - 1, 1]
+        vx, vy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+        if max(np.hypot(ux, uy), np.hypot(vx, vy)) > _FARTHEST:
+            continue
+        length = np.hypot(ux + vx, uy + vy)
+        off = (ux * vy - uy * vx) / length
+        across = ((ux + vx) * points[i, 1] - (uy + vy) * points[i, 0]) / length
+        square = points[i, 0] ** 2 + points[i, 1] ** 2
+        if off * off < _STRAIGHT * (noise[0] * across * across / square + _RELIEF**2):
+            _fit_line(points, i, i - 1, 3, noise, single[i])
+            single[i, COUNT] = SLANTED
+
+
+@kernel
+def _neighbours(points: Array, i: int, reach: float, gap: float) -> tuple[int, int]:
+    """First point and number of points of the run around point i, by squared distances; around the ring."""
+    N = len(points)
+    first, count = i, 1
+    for way in (-1, 1):
+        k, x, y = i, points[i, 0], points[i, 1]
+        while count < N:
+            k += way
+            if k < 0:
+                k = N - 1
+            elif k == N:
+                k = 0
+            u, v = points[k, 0], points[k, 1]
+            if (u - x) ** 2 + (v - y) ** 2 > gap:
+                break
+            if (u - points[i, 0]) ** 2 + (v - points[i, 1]) ** 2 > reach:
+                break
+            x, y = u, v
+            count += 1
+            if way < 0:
+                first = k
+    return first, count
