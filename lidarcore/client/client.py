@@ -188,23 +188,19 @@ class Client:
 
         Switched on by `client.set(repeatability={"running": True})` while the sensor stands still.
         """
-        found: dict[str, Any] = self._connection.get("/repeatability")
-        return found
+        return self._connection.get("/repeatability")
 
     def calibrate(self, scans: int = 100) -> dict[str, Any]:
         """Begin to measure the noise of a sensor that stands still, from its next scans; see `calibration`."""
-        state: dict[str, Any] = self._connection.send("POST", "/calibration", {"scans": scans})
-        return state
+        return self._connection.send("POST", "/calibration", {"scans": scans})
 
     def calibration(self) -> dict[str, Any]:
         """The calibration under way, or the last one: as GET /api/v1/calibration describes."""
-        state: dict[str, Any] = self._connection.get("/calibration")
-        return state
+        return self._connection.get("/calibration")
 
     def profiles(self) -> list[dict[str, Any]]:
         """The noise profiles that were saved: name, noise, or the problem with the file."""
-        profiles: list[dict[str, Any]] = self._connection.get("/profiles")["profiles"]
-        return profiles
+        return self._connection.get("/profiles")["profiles"]
 
     def save_profile(
         self,
@@ -232,13 +228,11 @@ class Client:
 
     def settings(self) -> dict[str, Any]:
         """All settings, section by section."""
-        settings: dict[str, Any] = self._connection.get("/settings")
-        return settings
+        return self._connection.get("/settings")
 
     def set(self, **sections: Mapping[str, Any]) -> dict[str, Any]:
         """Change settings: `client.set(navigation={"mode": "slam"})`; None puts a default back. All settings then."""
-        settings: dict[str, Any] = self._connection.send("PATCH", "/settings", sections)
-        return settings
+        return self._connection.send("PATCH", "/settings", sections)
 
     def frames(self, points: bool = False) -> Iterator[dict[str, Any]]:
         """Frames as they are made, each as GET /api/v1/frame describes; a slow client gets fewer, never old ones."""

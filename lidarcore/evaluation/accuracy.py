@@ -108,16 +108,14 @@ def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> Bools:
     normal = left_of(tangent)
     across = [np.abs(((p[:, None] - origin) * normal).sum(-1)) for p in (start, end)]
     middle = (((start + end)[:, None] / 2 - origin) * tangent).sum(-1)
-    near: Bools = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
-    return near
+    return (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
 
 
 def _covered_beams(segments: Segments, beams: int) -> Bools:
     """(M, N) true where a segment covers a beam."""
     first, last = segments.first_beam[:, None], segments.last_beam[:, None]
     k = np.arange(beams)
-    inside: Bools = np.where(first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last))
-    return inside
+    return np.where(first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last))
 
 
 def _views(walls: Array, hit: Ints, bearings: Array) -> list[_View]:

@@ -107,5 +107,4 @@ def _standard_error(numerators: Array, denominators: Array, value: ArrayLike) ->
     """(...) of ratios with that value (...), from blocks (..., B)."""
     blocks = numerators.shape[-1]
     scatter = np.square(numerators - np.expand_dims(value, -1) * denominators).sum(-1)
-    error: Array = np.sqrt(scatter * blocks / (blocks - 1)) / denominators.sum(-1)
-    return error
+    return np.sqrt(scatter * blocks / (blocks - 1)) / denominators.sum(-1)

@@ -194,7 +194,4 @@ def _within(drive: Drive, design: Design) -> Array:
     """Which objects are in view at the end."""
     x, y, heading = drive.truth[-1]
     to_post = (_posts(drive) - [x, y]) @ [1, 1j] * np.exp(-1j * heading)
-    near: Array = (np.abs(to_post) < design.max_range) & (
-        np.abs(np.angle(to_post)) < design.field_of_view / 2
-    )
-    return near
+    return (np.abs(to_post) < design.max_range) & (np.abs(np.angle(to_post)) < design.field_of_view / 2)

@@ -102,8 +102,7 @@ def _maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str
 
 def _aside(corners: Array) -> Array:
     """Places for the numbers of corners: a little farther from the sensor, where they do not hide corners."""
-    away: Array = corners * (1 + 0.35 / np.linalg.norm(corners, axis=1, keepdims=True))
-    return away
+    return corners * (1 + 0.35 / np.linalg.norm(corners, axis=1, keepdims=True))
 
 
 def methods(fitters: Sequence[str]) -> str:

@@ -100,8 +100,7 @@ def _place(walls: Walls, one: Feature) -> int:
 def _points(walls: Walls, one: Feature) -> Array:
     """Both ends of a wall, or the corner itself: (2, 2) or (1, 2) m. Raises MeasureError."""
     at = _place(walls, one)
-    points: Array = walls.ends[at] if one.kind == "wall" else walls.corners.xy[at][None]
-    return points
+    return walls.ends[at] if one.kind == "wall" else walls.corners.xy[at][None]
 
 
 def _rows(walls: Walls, one: Feature) -> csr_array:

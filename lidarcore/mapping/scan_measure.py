@@ -75,8 +75,7 @@ def _points_of(features: Features, one: Feature) -> _Points:
 
     def points(lines: Array) -> Array:
         normal = unit_vectors(lines[wall, 0])
-        placed: Array = lines[wall, 1] * normal + along[:, None] * left_of(normal)
-        return placed
+        return lines[wall, 1] * normal + along[:, None] * left_of(normal)
 
     return points
 

@@ -85,5 +85,4 @@ def _sines(walls: Array, directions: Array) -> Array:
     """Sine (N,) of the angle between each wall (N, 2, 2) and unit vector (N, 2)."""
     along = walls[:, 1] - walls[:, 0]
     across = along[:, 0] * directions[:, 1] - along[:, 1] * directions[:, 0]
-    sines: Array = np.abs(across) / np.hypot(along[:, 0], along[:, 1])
-    return sines
+    return np.abs(across) / np.hypot(along[:, 0], along[:, 1])

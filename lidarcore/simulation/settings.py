@@ -37,8 +37,7 @@ class OdometryError:
         """What wheels say of a true increment (3,) m, m, rad, seen from where it starts."""
         systematic = increment * [1 + self.scale, 1 + self.scale, 1 + self.track]
         sigma = np.sqrt(np.diag(self.noise.covariance(increment)))
-        measured: Array = systematic + rng.normal(0, 1, 3) * sigma
-        return measured
+        return systematic + rng.normal(0, 1, 3) * sigma
 
 
 @settings

@@ -44,8 +44,7 @@ class Surface:
         below = at.astype(np.int64)
         share = at - below
         index = self.first[walls] + below
-        between: Array = (1 - share) * self.offsets[index] + share * self.offsets[index + 1]
-        return between
+        return (1 - share) * self.offsets[index] + share * self.offsets[index + 1]
 
 
 def _pattern(count: int, step: float, rng: np.random.Generator) -> Array:
@@ -55,5 +54,4 @@ def _pattern(count: int, step: float, rng: np.random.Generator) -> Array:
     kept = np.exp(-step)
     steps = np.sqrt(1 - kept**2) * rng.normal(size=count)
     steps[0] = rng.normal()
-    pattern: Array = lfilter([1.0], [1.0, -kept], steps)
-    return pattern
+    return lfilter([1.0], [1.0, -kept], steps)

@@ -50,8 +50,7 @@ class World:
         ux, uy = np.cos(directions), np.sin(directions)
         share = (x + ranges * ux - start[:, 0]) * along[:, 0] + (y + ranges * uy - start[:, 1]) * along[:, 1]
         outwards = along[:, 0] * uy - along[:, 1] * ux  # cosine of the angle to the normal on the left
-        farther: Array = surface.at(hit, np.maximum(share, 0.0)) / outwards
-        return farther
+        return surface.at(hit, np.maximum(share, 0.0)) / outwards
 
     def clearance(self, x: float, y: float) -> float:
         """Distance (m) from a point to the nearest wall."""

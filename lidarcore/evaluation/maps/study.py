@@ -137,5 +137,4 @@ def wrong_loops(loops: Sequence[Loop], reference: Array) -> int:
 def wrong_poses(poses: Array, reference: Array) -> Mask:
     """Which poses (N, 3) are more than 0.5 m or 0.2 rad off."""
     off = pose_difference(poses, reference)
-    wrong: Mask = (np.hypot(off[:, 0], off[:, 1]) > _WRONG) | (np.abs(off[:, 2]) > _WRONG_TURN)
-    return wrong
+    return (np.hypot(off[:, 0], off[:, 1]) > _WRONG) | (np.abs(off[:, 2]) > _WRONG_TURN)

@@ -61,8 +61,7 @@ class FeatureSet:
         a_a = 1 / half**2
         a_r = middle * a_a
         r_r = 1 + middle * a_r
-        matrices: Array = np.stack([a_a, a_r, a_r, r_r], -1).reshape(-1, 2, 2)
-        return matrices
+        return np.stack([a_a, a_r, a_r, r_r], -1).reshape(-1, 2, 2)
 
     def _of_corners(self, added: Array) -> Array:
         """(K, 2, 2) m² that covariances (M, 2, 2) of the lines make of corners: n . x = r for both lines."""
@@ -71,8 +70,7 @@ class FeatureSet:
         slope = np.stack([-along, np.ones_like(along)], -1)  # of n . x - r, by alpha and r, negative
         across = np.einsum("kwi,kwij,kwj->kw", slope, added[self.walls], slope)
         inverse = np.linalg.inv(normals)
-        covariances: Array = np.einsum("kiw,kw,kjw->kij", inverse, across, inverse)
-        return covariances
+        return np.einsum("kiw,kw,kjw->kij", inverse, across, inverse)
 
 
 def moved(lines: Array, pose: Array) -> tuple[Array, Array, Array]:
@@ -90,5 +88,4 @@ def moved(lines: Array, pose: Array) -> tuple[Array, Array, Array]:
 
 def moved_ends(ends: Array, pose: Array) -> Array:
     """(M, 2, 2) m, ends of walls in frame a, from T_a_b (3,)."""
-    there: Array = act(pose, ends)
-    return there
+    return act(pose, ends)

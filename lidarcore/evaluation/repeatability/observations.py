@@ -53,5 +53,4 @@ def covariances(table: Array) -> Array:
 
 def root_det(c: Array) -> Array:
     """Root of the determinant (...) of covariances (..., 4), 0 where that is negative."""
-    root: Array = np.sqrt(np.maximum(c[..., 0] * c[..., 3] - c[..., 1] * c[..., 2], 0.0))
-    return root
+    return np.sqrt(np.maximum(c[..., 0] * c[..., 3] - c[..., 1] * c[..., 2], 0.0))

@@ -104,14 +104,12 @@ def _from_a_start(world: World, pose: Array, bearings: Array) -> tuple[Array, Ar
 
 
 def _turned(xy: Array, turn: complex) -> Array:
-    rotated: Array = (np.ascontiguousarray(xy).view(complex) * turn).view(float)
-    return rotated
+    return (np.ascontiguousarray(xy).view(complex) * turn).view(float)
 
 
 def _cross(a: Array, b: Array) -> Array:
     """(M,) positive where b is less than half a turn counter-clockwise of a, (M, 2) each."""
-    z: Array = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return z
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _lines(along: Array, points: Array) -> Array:
@@ -119,8 +117,7 @@ def _lines(along: Array, points: Array) -> Array:
     tangent = along / np.linalg.norm(along, axis=1, keepdims=True)
     normal = tangent[:, ::-1] * [1, -1]
     r = (normal * points).sum(1)
-    lines: Array = np.column_stack([normal, r]) * np.where(r < 0, -1.0, 1.0)[:, None]
-    return lines
+    return np.column_stack([normal, r]) * np.where(r < 0, -1.0, 1.0)[:, None]
 
 
 @kernel

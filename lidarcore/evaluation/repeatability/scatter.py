@@ -53,13 +53,11 @@ class Scatter:
         (Wishart in the plane with n - 1 of them): root(det A) / (n - 2) has the mean root(det C).
         """
         xx, xy, yy = np.moveaxis(self.squares, -1, 0)
-        actual: Array = np.sqrt(np.maximum(xx * yy - xy * xy, 0.0)) / np.maximum(self.counts - 2, 1)
-        return actual
+        return np.sqrt(np.maximum(xx * yy - xy * xy, 0.0)) / np.maximum(self.counts - 2, 1)
 
     def claimed(self, kind: int) -> Array:
         """(K, M) root(det) of the mean claimed covariance."""
-        claimed: Array = self._claimed[..., kind]
-        return claimed
+        return self._claimed[..., kind]
 
     @cached_property
     def _claimed(self) -> Array:

@@ -160,5 +160,4 @@ def _walls_seen(found: Features) -> Array:
 
 def _feet(lines: Array) -> Array:
     """(R, 2) m, the points of lines (alpha, r) next to the sensor."""
-    feet: Array = lines[:, 1:] * unit_vectors(lines[:, 0])
-    return feet
+    return lines[:, 1:] * unit_vectors(lines[:, 0])

@@ -156,8 +156,7 @@ def _table(found: Features) -> Array:
 def _along(lines: Array, alpha: Array) -> Array:
     """(P, 2) from where to where (m) along walls with the normals alpha (P,) pieces (P, 6) go."""
     tangents = np.column_stack([-np.sin(alpha), np.cos(alpha)])
-    along: Array = np.sort((lines[:, 2:].reshape(-1, 2, 2) @ tangents[..., None])[..., 0], axis=1)
-    return along
+    return np.sort((lines[:, 2:].reshape(-1, 2, 2) @ tangents[..., None])[..., 0], axis=1)
 
 
 def shared_extents(lines: Array, known: Array, noise: float) -> Array:

@@ -125,8 +125,7 @@ def _medians(values: Array) -> Array:
     ordered = np.sort(values, axis=0)  # NaN last
     n = np.isfinite(values).sum(0)
     padded, rest = np.concatenate([ordered, np.full((1, *n.shape), np.nan)]), tuple(np.indices(n.shape))
-    medians: Array = (padded[np.maximum(n - 1, 0) // 2, *rest] + padded[n // 2, *rest]) / 2
-    return medians
+    return (padded[np.maximum(n - 1, 0) // 2, *rest] + padded[n // 2, *rest]) / 2
 
 
 def _boxes(values: Array) -> Iterator[Box | None]:

@@ -136,8 +136,7 @@ class _Walls:
 
     def but(self, i: int) -> Bools:
         """All walls but this one."""
-        others: Bools = np.arange(len(self.e)) != i
-        return others
+        return np.arange(len(self.e)) != i
 
     def is_told(self, i: int) -> bool:
         """Whether the others tell where this wall is, about as well as it is seen itself."""

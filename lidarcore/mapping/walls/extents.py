@@ -30,8 +30,7 @@ def stretches(pieces: Pieces, members: Ints, fit: Fit, grid: OccupancyGrid, sett
     first, last = np.append(0, breaks + 1), np.append(breaks, len(there) - 1)
     found = np.stack([there[first], there[last]], -1)
     stands = (last - first + 1) * _STEP >= _SOLID * (found[:, 1] - found[:, 0])
-    result: Array = found[stands]
-    return result
+    return found[stands]
 
 
 def _covered(at: Array, t: Array) -> Mask:
@@ -39,8 +38,7 @@ def _covered(at: Array, t: Array) -> Mask:
     starts, ends = np.sort(t.min(axis=1)), np.sort(t.max(axis=1))
     begun = np.searchsorted(starts, at + _STEP, "right")
     done = np.searchsorted(ends, at - _STEP, "left")
-    covered: Mask = begun > done
-    return covered
+    return begun > done
 
 
 def _ask(grid: OccupancyGrid, fit: Fit, at: Array) -> tuple[Mask, Mask]:

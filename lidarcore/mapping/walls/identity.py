@@ -53,8 +53,7 @@ def _same(before: Observations, now: Observations, shape: tuple[int, int]) -> Ma
     shared = common(before, now, shape).toarray()
     then = now.where(now.segment <= before.segment.max(initial=-1))
     of_before, of_now = before.lengths(shape[0])[:, None], then.lengths(shape[1])
-    same: Mask = (shared > 0) & ((shared >= _MOST * of_before) | (shared >= _MOST * of_now))
-    return same
+    return (shared > 0) & ((shared >= _MOST * of_before) | (shared >= _MOST * of_now))
 
 
 def _beside(before: Walls, now: Walls) -> Mask:
@@ -67,5 +66,4 @@ def _beside(before: Walls, now: Walls) -> Mask:
     shared = np.minimum(t[..., 1], now.length) - np.maximum(t[..., 0], 0)
     shorter = np.minimum(before.length[:, None], now.length)
     alike = way_before @ along.T > _ALIKE * before.length[:, None]
-    beside: Mask = alike & (off < _BESIDE) & (shared > _MOST * shorter)
-    return beside
+    return alike & (off < _BESIDE) & (shared > _MOST * shorter)

@@ -59,10 +59,7 @@ class WallModel:
             blocks = full.reshape(count, size, count, size)
             found.append(blocks[np.arange(count), :, np.arange(count)])
         C = np.concatenate(found)
-        symmetric: Array = (
-            C + C.swapaxes(1, 2)
-        ) / 2  # rounding leaves the two halves apart, and only one is stored
-        return symmetric
+        return (C + C.swapaxes(1, 2)) / 2  # rounding leaves the two halves apart, and only one is stored
 
     def ends_of(self, *walls: int) -> csr_array:
         """Rows (4 N, 4 W): x and y of both ends of walls, one after the other."""

@@ -67,8 +67,7 @@ class Observations:
 
     def lengths(self, walls: int) -> Array:
         """How much (W,) m of segments was seen of each of so many walls, each segment for itself."""
-        total: Array = np.bincount(self.wall, np.diff(self.span)[:, 0], walls).astype(np.float64)
-        return total
+        return np.bincount(self.wall, np.diff(self.span)[:, 0], walls).astype(np.float64)
 
 
 def common(before: Observations, now: Observations, shape: tuple[int, int]) -> csr_array:
