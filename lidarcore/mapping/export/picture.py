@@ -1,6 +1,6 @@
 """The grid as a picture to look at, with the walls and the path of the sensor drawn over it."""
 
-from typing import BinaryIO
+from io import BytesIO
 
 from PIL import Image, ImageDraw
 
@@ -13,8 +13,8 @@ _WALL, _CORNER, _PATH = (200, 30, 30), (20, 60, 200), (60, 160, 190)
 _SMALLEST = 1500  # pixels that the longer side should have
 
 
-def map_png(grid: OccupancyGrid, walls: Walls, path: Array, file: BinaryIO) -> None:
-    """Write the picture as PNG, y up; path (T, 2) m."""
+def map_png(grid: OccupancyGrid, walls: Walls, path: Array) -> bytes:
+    """The picture as PNG, y up; path (T, 2) m."""
     shades = shades_of(grid)
     zoom = max(1, _SMALLEST // max(shades.shape))
     picture = Image.fromarray(shades).convert("RGB")
@@ -26,7 +26,9 @@ def map_png(grid: OccupancyGrid, walls: Walls, path: Array, file: BinaryIO) -> N
         draw.line(_pixels(grid, ends, zoom), fill=_WALL, width=2)
     for x, y in _pixels(grid, walls.corners.xy, zoom):
         draw.ellipse([x - 3, y - 3, x + 3, y + 3], outline=_CORNER)
+    file = BytesIO()
     picture.save(file, "PNG")
+    return file.getvalue()
 
 
 def _pixels(grid: OccupancyGrid, xy: Array, zoom: int) -> list[tuple[float, float]]:

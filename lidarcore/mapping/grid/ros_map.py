@@ -74,16 +74,16 @@ def write_ros_map(grid: OccupancyGrid, path: str | Path) -> None:
     image = path.with_suffix(".pgm")
     try:
         with replacing_all(image, path) as (image_part, yaml_part):
-            write_pgm(grid, image_part)
+            image_part.write_bytes(ros_pgm(grid))
             yaml_part.write_text(ros_yaml(grid, image.name), "utf-8")
     except OSError as error:
         raise MapFileError(f"{path} cannot be written: {error}.") from error
 
 
-def write_pgm(grid: OccupancyGrid, path: Path) -> None:
-    """Write the image alone. Raises OSError."""
+def ros_pgm(grid: OccupancyGrid) -> bytes:
+    """The image alone."""
     height, width = grid.cells.shape
-    path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + shades_of(grid).tobytes())
+    return b"P5\n%d %d\n255\n" % (width, height) + shades_of(grid).tobytes()
 
 
 def shades_of(grid: OccupancyGrid) -> NDArray[np.uint8]:

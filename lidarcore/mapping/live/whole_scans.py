@@ -1,6 +1,8 @@
 """The pose from whole scans: each one is matched to the last keyframes at once, and the map behind catches up."""
 
+from collections import deque
 from collections.abc import Callable
+from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -136,7 +138,8 @@ class WholeScans:
     def _begin(self) -> None:
         self._front = FrontEnd(self._settings.front)
         self._background = self._begun()
-        self._ways: list[UncertainPose] = []  # to each keyframe from the one before it
+        # To each keyframe from the one before it, but for those that the map has already, so many.
+        self._ways, self._joined = deque[UncertainPose](), 0
         self._tie = _HERE  # T_keyframe_sensor
         self._here: UncertainPose | None = None
         self._is_nowhere = False
@@ -155,13 +158,17 @@ class WholeScans:
             self._background.put(tracked)
             tie = _HERE
         self._tie = tie
-        self._here = self._chain(self._background.corrected)[-1].compose(tie)
+        known = self._background.corrected
+        while self._ways and self._joined < known.keyframes:
+            self._ways.popleft()
+            self._joined += 1
+        self._here = self._chain(known)[-1].compose(tie)
         return self._here
 
     def _chain(self, known: Corrected) -> list[UncertainPose]:
         """Poses of the last keyframe that the map has, and of those since."""
         poses = [UncertainPose(known.poses[-1], known.covariance)]
-        for way in self._ways[len(known.poses) :]:
+        for way in islice(self._ways, max(known.keyframes - self._joined, 0), None):
             poses.append(poses[-1].compose(way))
         return poses
 
