@@ -150,13 +150,9 @@ def simulated(
     rng = np.random.default_rng(seed)
     trials = simulate([place], segmentation, settings, scans, rng)
     return CornerStudy(
-        {(name, kind): _clockwise(trials[name, kind]) for name in FITTERS for kind in KINDS},
+        {(name, kind): trials[name, kind][::-1] for name in FITTERS for kind in KINDS},  # clockwise
         place.bounds[::-1],
     )
-
-
-def _clockwise(trials: Trials) -> Trials:
-    return Trials(trials.errors[::-1], trials.covariances[::-1], trials.bounds[::-1], trials.corners[::-1])
 
 
 def recorded(scans: Sequence[Scan], settings: ExtractionSettings, fitters: Sequence[str]) -> CornerStudy:

@@ -7,6 +7,7 @@ from typing import Literal, cast
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
+from lidarcore.columns import Columns
 from lidarcore.compiled import kernel
 from lidarcore.corners import intersect
 from lidarcore.evaluation.repeatability.places import Place
@@ -32,7 +33,7 @@ CORNER = CORNER_FIELDS  # error (2) and covariances: a corner as `intersect` wri
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trials:
+class Trials(Columns):
     """P corners, each estimated from K independent scans from one place by one method; sensor frame.
 
     errors       (P, K, 2) m, estimate minus truth; NaN where no corner came out

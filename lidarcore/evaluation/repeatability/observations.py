@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
+from lidarcore.columns import Columns
 from lidarcore.evaluation.consistency.design import KINDS
 
 OBSERVATION = 10
@@ -12,7 +13,7 @@ OBSERVATION = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observations:
+class Observations(Columns):
     """R observations of features, all corners or all walls; for `scatter.scatter` sorted by feature and then by scan.
 
     ids, scans (R,); table (R, M, OBSERVATION) for M methods, NaN where a method did not find the feature; (R, 2) of
@@ -27,18 +28,6 @@ class Observations:
     def starts(self) -> Ints:
         """(K,) where each feature begins."""
         return np.flatnonzero(np.diff(self.ids, prepend=-1))
-
-    def without(self, n: int) -> "Observations":
-        """All but the first n observations."""
-        return Observations(self.ids[n:], self.scans[n:], self.table[n:])
-
-    def followed_by(self, other: "Observations") -> "Observations":
-        """These observations, then others."""
-        return Observations(
-            np.concatenate([self.ids, other.ids]),
-            np.concatenate([self.scans, other.scans]),
-            np.concatenate([self.table, other.table]),
-        )
 
 
 def one_sigma_areas(table: Array) -> Array:

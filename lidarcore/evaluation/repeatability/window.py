@@ -49,7 +49,7 @@ class FeatureWindow:
         ids = np.array([row.id for row in rows], np.int64)
         new = Observations(ids, np.full(len(ids), self._added), table[k, first, :2])
         oldest = len(self._records[0].table) if len(self) == self._records.maxlen else 0
-        self._firsts = self._firsts.without(oldest).followed_by(new)
+        self._firsts = Observations.joined([self._firsts[oldest:], new])
         self._records.append(_Record(table, _medians(one_sigma_areas(table))))
         self._added += 1
 

@@ -1,12 +1,13 @@
 """Ellipses after calibration: each station's first half tells the noise, its second half judges what it leads to."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
 
-from lidarcore.arrays import Array, Bools, Ints
+from lidarcore.arrays import Array, Ints
+from lidarcore.columns import Columns
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.consistency.design import KINDS
@@ -27,7 +28,7 @@ SHORTEST = 40  # scans of a station that is judged at all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Figures:
+class Figures(Columns):
     """F features, each judged in one window, by M methods: corners in m², walls in rad m.
 
     counts (F, M) of sightings; hits (F, M) of them in the 95 % ellipse; claimed and actual (F, M), root(det) of the
@@ -56,19 +57,6 @@ class Figures:
             window * numbers,
             station * numbers,
         )
-
-    @classmethod
-    def together(cls, parts: Sequence["Figures"]) -> "Figures":
-        """Figures of several windows together; the numbers of the windows differ."""
-        columns = [[getattr(part, field.name) for part in parts] for field in fields(cls)]
-        return cls(*(np.concatenate(column) for column in columns))
-
-    def __len__(self) -> int:
-        return len(self.counts)
-
-    def __getitem__(self, which: Bools) -> "Figures":
-        """Figures of the chosen features (F,)."""
-        return Figures(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def stands(self, method: int) -> bool:
         """Whether coverage stands for itself, if these are of one station."""
@@ -188,7 +176,7 @@ def study(
         raise EvaluationError(
             f"There is no station to judge: the sensor should stand still for {SHORTEST} scans at least."
         )
-    return StationStudy(tuple(methods), tuple(judged), Figures.together(walls), Figures.together(corners))
+    return StationStudy(tuple(methods), tuple(judged), Figures.joined(walls), Figures.joined(corners))
 
 
 def _calibrated(station: Station, scans: Sequence[Scan]) -> Station:

@@ -10,13 +10,13 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.mapping.grid.occupancy import Mask
+from lidarcore.columns import Columns
 from lidarcore.mapping.walls.parts import Part
 from lidarcore.mapping.walls.pieces import Pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observations:
+class Observations(Columns):
     """N stretches of segments, each seen of one wall.
 
     wall     (N,) which; a segment may have been seen of several, one beside the other
@@ -27,9 +27,6 @@ class Observations:
     wall: Ints
     segment: Ints
     span: Array
-
-    def __len__(self) -> int:
-        return len(self.wall)
 
     @classmethod
     def none(cls) -> "Observations":
@@ -47,19 +44,6 @@ class Observations:
             on = span[:, 1] > span[:, 0]
             found.append(cls(np.full(on.sum(), i), part.members[on], span[on]))
         return cls.joined(found)
-
-    @classmethod
-    def joined(cls, several: Sequence["Observations"]) -> "Observations":
-        """The observations of several, one after the other."""
-        return cls(
-            np.concatenate([one.wall for one in several]),
-            np.concatenate([one.segment for one in several]),
-            np.concatenate([one.span for one in several]),
-        )
-
-    def where(self, chosen: Mask) -> "Observations":
-        """The chosen observations (N,)."""
-        return Observations(self.wall[chosen], self.segment[chosen], self.span[chosen])
 
     def renamed(self, names: Ints) -> "Observations":
         """These observations, with names[i] for wall i."""
