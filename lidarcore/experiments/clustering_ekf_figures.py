@@ -15,10 +15,9 @@ from lidarcore.experiments.clustering_ekf import (
     TRAJECTORIES,
     ClusteringStudy,
     Design,
-    Drive,
     simulate,
 )
-from lidarcore.experiments.tracks import Track
+from lidarcore.experiments.tracks import Drive, Track
 from lidarcore.geometry import act, unit_vectors
 from lidarcore.reporting import Bar, Map, bars, chart
 

@@ -9,9 +9,9 @@ import numpy as np
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
+from lidarcore.evaluation.consistency.places import Place
 from lidarcore.evaluation.consistency.trials import Segmentation, Trials, simulate
 from lidarcore.evaluation.intervals import LEVEL, Interval, ratio, share
-from lidarcore.evaluation.repeatability.places import Place
 from lidarcore.extraction import compare
 from lidarcore.features import Corners
 from lidarcore.geometry import contains

@@ -37,8 +37,8 @@ def agreement(
     from dataclasses import asdict
 
     from lidarcore import files
+    from lidarcore.evaluation.repeatability.tables import json_text
     from lidarcore.evaluation.stations.agreement_study import study
-    from lidarcore.files.texts import json_text
 
     check_output(output, ".json")
     chosen = settings_from(settings, set_)

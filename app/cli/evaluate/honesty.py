@@ -40,7 +40,7 @@ def honesty(
 
     from lidarcore import files
     from lidarcore.evaluation.maps.honesty import study_honesty
-    from lidarcore.files.texts import json_text
+    from lidarcore.evaluation.repeatability.tables import json_text
     from lidarcore.simulation.worlds import WORLDS
 
     check_output(output, ".json")

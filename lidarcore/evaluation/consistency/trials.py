@@ -10,7 +10,7 @@ from lidarcore.arrays import Array, Ints
 from lidarcore.columns import Columns
 from lidarcore.compiled import kernel
 from lidarcore.corners import intersect
-from lidarcore.evaluation.repeatability.places import Place
+from lidarcore.evaluation.consistency.places import Place
 from lidarcore.extraction import compiled_call
 from lidarcore.geometry.kernels import wrap
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, WORK, fit_piece

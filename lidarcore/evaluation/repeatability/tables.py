@@ -10,6 +10,8 @@ from lidarcore.evaluation.consistency.tables import check
 from lidarcore.evaluation.repeatability.summary import Method, Summary
 from lidarcore.files.texts import csv_text, finite, json_text
 
+__all__ = ["finite", "json_text", "to_csv", "to_json", "write"]
+
 
 def write(summary: Summary, path: Path) -> None:
     """Raises EvaluationError unless the file's name ends in .json or .csv."""

@@ -11,8 +11,8 @@ import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.evaluation.consistency.figures import GATES, LEVELS
-from lidarcore.evaluation.repeatability.feature_set import FeatureSet, moved, moved_ends
 from lidarcore.evaluation.repeatability.wall_tracker import shared_extents, unwrapped
+from lidarcore.evaluation.stations.feature_set import FeatureSet, moved, moved_ends
 from lidarcore.geometry import act, act_jacobians, squared_mahalanobis
 
 _STEPS = 5

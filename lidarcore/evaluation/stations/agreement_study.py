@@ -9,8 +9,8 @@ import numpy as np
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.intervals import Interval, share
-from lidarcore.evaluation.repeatability.feature_set import FeatureSet
 from lidarcore.evaluation.stations.agreement import GATE, Differences, Pair, differences, systematic_part
+from lidarcore.evaluation.stations.feature_set import FeatureSet
 from lidarcore.extraction import extract
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.matching.correlative import search
