@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.features import Features
-from lidarcore.geometry import act, left_of, unit_vectors
+from lidarcore.geometry import left_of, unit_vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,8 +84,3 @@ def moved(lines: Array, pose: Array) -> tuple[Array, Array, Array]:
     by_line[:, 0, 0] = by_line[:, 1, 1] = 1
     by_line[:, 1, 0] = turned
     return np.column_stack([alpha, lines[:, 1] + normal @ pose[:2]]), by_pose, by_line
-
-
-def moved_ends(ends: Array, pose: Array) -> Array:
-    """(M, 2, 2) m, ends of walls in frame a, from T_a_b (3,)."""
-    return act(pose, ends)

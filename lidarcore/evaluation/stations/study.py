@@ -12,7 +12,7 @@ from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.consistency.figures import LEVELS
-from lidarcore.evaluation.intervals import LEVEL, Interval, share
+from lidarcore.evaluation.intervals import LEVEL, UNKNOWN, Interval, share
 from lidarcore.evaluation.repeatability.scatter import LEAST, Scatter
 from lidarcore.evaluation.repeatability.statistics import WINDOW, Repeatability
 from lidarcore.extraction import compare
@@ -105,7 +105,7 @@ class Figures(Columns):
         """Windows are what errors are independent between, and Student's t knows how few they are."""
         seen = np.isfinite(logs)
         if not seen.any():
-            return Interval(np.nan, np.nan, np.nan)
+            return UNKNOWN
         weights = self.counts[seen, method]
         mean = float(np.average(logs[seen], weights=weights))
         window = np.unique(self.window[seen], return_inverse=True)[1]
