@@ -11,7 +11,7 @@ from lidarcore.landmarks.landmark import Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
 from lidarcore.landmarks.landmark_store import forget_landmarks, store_landmarks
 from lidarcore.landmarks.queries import check_finite
-from lidarcore.landmarks.wall_store import forget_walls
+from lidarcore.landmarks.stored_wall import forget_walls
 
 _SESSIONS = """SELECT id, source, mode, started, ended,
     (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id),

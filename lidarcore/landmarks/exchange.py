@@ -10,6 +10,7 @@ import reprlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -120,10 +121,6 @@ def _write_json(rows: Iterable[Row], file: TextIO) -> None:
     file.writelines(json_lines(_HEADER, "landmarks", rows))
 
 
-def _read_json(file: TextIO) -> Iterator[Row]:
-    return _items(file, "landmarks")
-
-
 def _write_geojson(rows: Iterable[Row], file: TextIO) -> None:
     file.writelines(json_lines({"type": "FeatureCollection"} | _HEADER, "features", map(_feature, rows)))
 
@@ -206,7 +203,7 @@ class Format:
 
 
 FORMATS = {
-    "json": Format(_write_json, _read_json),
+    "json": Format(_write_json, partial(_items, key="landmarks")),
     "csv": Format(_write_csv, _read_csv),
     "geojson": Format(_write_geojson, _read_geojson),
 }
