@@ -103,4 +103,4 @@ def _median(values: Array) -> tuple[float, float, float]:
 def in_words(figure: Interval, factor: float = 1.0) -> str:
     """A figure with its confidence interval."""
     digits = 1 if factor == 100 else 3 if figure.value < 2 else 2
-    return f"{factor * figure.value:.{digits}f} ({factor * figure.low:.{digits}f} to {factor * figure.high:.{digits}f})"
+    return figure.span(digits, factor, " to ")

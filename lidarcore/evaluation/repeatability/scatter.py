@@ -168,9 +168,8 @@ def scatter(observations: Observations, scans: int) -> Scatter:
 def _tally(nees: Array, judged: Bools, groups: Ints, n: int) -> Array:
     """(n, M, 2, 4) of residuals (M, 2, R) in n groups (R,): those within the ellipses of GATES, and all; none else."""
     cells = np.arange(np.prod(nees.shape[:2])).reshape(*nees.shape[:2], 1)
-    within = sum(
-        (nees <= gate).astype(np.int64) for gate in GATES
-    )  # of 1, 2 or 3, as larger ones hold it, too
+    # Within so many ellipses of 3: the larger ones hold what a smaller one does.
+    within = sum((nees <= gate).astype(np.int64) for gate in GATES)
     keys = (groups * cells.size + cells) * (len(GATES) + 2) + np.where(judged[:, None], within + 1, 0)
     shape = (n, *nees.shape[:2], len(GATES) + 2)
     counts = np.bincount(keys.ravel(), minlength=int(np.prod(shape))).reshape(shape)

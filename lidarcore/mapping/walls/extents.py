@@ -9,9 +9,8 @@ from lidarcore.mapping.walls.pieces import Pieces
 from lidarcore.mapping.walls.settings import WallSettings
 
 _STEP = 0.01  # m between the points at which the grid is asked
-_SOLID = (
-    0.8  # share of a stretch that must stand: small holes are the grid's, many of them a wall's that is gone
-)
+# Share of a stretch that must stand: small holes are the grid's, many of them a wall's that is gone.
+_SOLID = 0.8
 _BAND = 1.0  # cells to both sides within which what stands there is the wall
 
 
