@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Self, Unpack
+from typing import Any, Unpack
 from urllib.parse import quote
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from lidarcore.client.answers import PastPose, Pose, SeenCorner, Which
 from lidarcore.client.connection import Connection, given
+from lidarcore.closing import Closing
 from lidarcore.errors import MapFileError, UnknownLandmarkError
 from lidarcore.files import replacing
 from lidarcore.landmarks import Box, Circle, Landmark, Metric, Neighbour, Session
@@ -19,7 +20,7 @@ _PAGE = 1000  # landmarks and states asked for at a time
 _MEDIA_TYPES = {"json": "application/json", "csv": "text/csv", "geojson": "application/geo+json"}
 
 
-class Client:
+class Client(Closing):
     """Speaks to the REST API and the WebSocket of one server.
 
     Every method raises ServerUnreachableError if nothing answers, and ClientError if the server refuses, with its
@@ -31,12 +32,6 @@ class Client:
     ) -> None:
         """`url` and `token` as the server printed them when it started; `timeout` in s."""
         self._connection = Connection(url, token, timeout)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the connection."""

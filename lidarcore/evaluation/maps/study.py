@@ -69,12 +69,12 @@ def prepared(scans: list[Scan], odometry: str, seed: int) -> tuple[list[Scan], A
     except EvaluationError:
         if odometry == "poor":
             raise
-        return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), None
+        reference, stands_in = None, False
     if odometry == "recorded" and stands_in:
         raise EvaluationError(
             "The log's odometry is all the reference there is: choose poor odometry, or none."
         )
-    if odometry == "poor" or (odometry == "auto" and stands_in):
+    if reference is not None and (odometry == "poor" or (odometry == "auto" and stands_in)):
         return with_poor_odometry(scans, reference, seed), reference
     return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), reference
 

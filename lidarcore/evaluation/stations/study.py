@@ -71,19 +71,19 @@ class Figures(Columns):
         """Share of the scatter in the 95 % ellipses; windows are what errors are independent between."""
         return share(*self._by(self.window, method).T)
 
+    def stations(self) -> dict[int, "Figures"]:
+        """Figures of each station by its number."""
+        return {number: self[self.station == number] for number in np.unique(self.station).tolist()}
+
     def by_station(self, method: int) -> dict[int, tuple[float, int]]:
         """Coverage and number of sightings of each station that saw a feature."""
-        numbers = np.unique(self.station).tolist()
-        sums = self._by(self.station, method).tolist()
-        return {number: (hits / n, int(n)) for number, (hits, n) in zip(numbers, sums, strict=True) if n}
+        sums = zip(self.stations(), self._by(self.station, method).tolist(), strict=True)
+        return {number: (hits / n, int(n)) for number, (hits, n) in sums if n}
 
     def extremes(self, method: int) -> tuple[float, float] | None:
         """Coverage of the lowest and the highest station of those that stand for themselves; None if there are none."""
-        shares = [
-            held
-            for number, (held, _) in self.by_station(method).items()
-            if self[self.station == number].stands(method)
-        ]
+        held, stations = self.by_station(method), self.stations()
+        shares = [share for number, (share, _) in held.items() if stations[number].stands(method)]
         return (min(shares), max(shares)) if shares else None
 
     def area_ratio(self, method: int) -> Interval:

@@ -1,5 +1,6 @@
 """Occupancy grids as ROS keeps them: an image, and beside it a YAML file that places it (Nav2 map_server)."""
 
+import re
 from collections.abc import Callable
 from functools import reduce
 from pathlib import Path
@@ -23,6 +24,7 @@ _MOST_PIXELS = 100_000_000
 _BYTES_OF_MEMORY = 70_000_000  # that an image may take beside four times the size of its file
 _BAND = 1 << 17  # pixels that are looked at together
 _OPAQUE = 255
+_PGM_HEADER = re.compile(rb"P5(?:\s+(?:#[^\n]*\n\s*)*\d+){3}\s")  # of a binary one, up to the pixels
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
@@ -171,28 +173,12 @@ def _check_size(path: Path, width: int, height: int, bytes_each: int) -> None:
 def _check_length(path: Path, width: int, height: int, is_deep: bool) -> None:
     """Raise MapFileError if a binary PGM holds less or more than the pixels it announces."""
     with path.open("rb") as file:
-        head, size = file.read(1000), path.stat().st_size
-    if not head.startswith(b"P5"):
-        return
+        header = _PGM_HEADER.match(file.read(1000))
     wanted = width * height * (2 if is_deep else 1)
-    header = _header_length(head)
-    if size != header + wanted:
+    if header and (held := path.stat().st_size - header.end()) != wanted:
         raise MapFileError(
-            f"{path.name} says {width} x {height} pixels, which take {wanted} bytes, but holds {size - header}."
+            f"{path.name} says {width} x {height} pixels, which take {wanted} bytes, but holds {held}."
         )
-
-
-def _header_length(head: bytes) -> int:
-    """Bytes before the pixels: three numbers, comments among them, and one space after the last."""
-    at, numbers = 2, 0
-    while numbers < 3:
-        while head[at : at + 1].isspace():
-            at += 1
-        comment = head[at : at + 1] == b"#"
-        while at < len(head) and not (head[at : at + 1] == b"\n" if comment else head[at : at + 1].isspace()):
-            at += 1
-        numbers += not comment
-    return at + 1
 
 
 def _trinary(shades: Array, opacity: Array, header: _Header) -> Cells:
