@@ -30,11 +30,6 @@ class Observations(Columns):
         return np.flatnonzero(np.diff(self.ids, prepend=-1))
 
 
-def one_sigma_areas(table: Array) -> Array:
-    """(..., 2) areas of the claimed one-sigma ellipses of observations (..., OBSERVATION), by KINDS."""
-    return np.pi * root_det(covariances(table))
-
-
 def covariances(table: Array) -> Array:
     """(..., 2, 4) claimed of observations (..., OBSERVATION), by KINDS."""
     return table[..., 2:].reshape(*table.shape[:-1], len(KINDS), 4)

@@ -55,12 +55,9 @@ class Scatter:
         xx, xy, yy = np.moveaxis(self.squares, -1, 0)
         return np.sqrt(np.maximum(xx * yy - xy * xy, 0.0)) / np.maximum(self.counts - 2, 1)
 
-    def claimed(self, kind: int) -> Array:
-        """(K, M) root(det) of the mean claimed covariance."""
-        return self._claimed[..., kind]
-
     @cached_property
-    def _claimed(self) -> Array:
+    def claimed(self) -> Array:
+        """(K, M, kinds) root(det) of the mean claimed covariance."""
         return root_det(covariances(self.means))
 
     def features(self) -> list[tuple[FeatureScatter, ...]]:
@@ -84,7 +81,7 @@ class Scatter:
         return [tuple(features[begin:end]) for begin, end in pairwise([0, *ends])]
 
     def _claims(self, at: tuple[Ints, Ints]) -> Iterator[dict[str, FeatureClaim]]:
-        n, claimed = self.counts[at], self._claimed[at]  # (G,), (G, kinds)
+        n, claimed = self.counts[at], self.claimed[at]  # (G,), (G, kinds)
         ratios = _area_ratios(claimed, self.actual[at][:, None], (2 * n - 4)[:, None])
         shares = self.hits[at] / n[:, None, None]
         covers = np.array([shares, *wilson(shares, n[:, None, None])])  # (3, G, kinds, levels)
@@ -112,8 +109,7 @@ class Scatter:
         if not actual.any():
             return np.full((3, len(KINDS)), np.nan)
         dof = 2 * actual.sum() ** 2 / (actual**2 / (self.counts[good, method] - 2)).sum()
-        claimed = np.array([self.claimed(kind)[good, method].sum() for kind in range(len(KINDS))])
-        return _area_ratios(claimed, actual.sum(), dof)
+        return _area_ratios(self.claimed[good, method].sum(0), actual.sum(), dof)
 
 
 def _judgements(ratios: Array, covers: Array) -> list[Judgement]:

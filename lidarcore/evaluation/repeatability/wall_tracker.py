@@ -137,13 +137,11 @@ def _pieces(features: Mapping[str, Features]) -> list[dict[str, int]]:
 def _lines(features: Mapping[str, Features], pieces: list[dict[str, int]]) -> Array:
     """(P, 6) alpha, r, start x, y, end x, y of each piece by the first method that has it."""
     owners = [next(iter(piece.items())) for piece in pieces]
-    tables = {name: _table(features[name]) for name in {name for name, _ in owners}}
+    tables = {}
+    for name in {name for name, _ in owners}:
+        lines, segments = features[name].lines, features[name].segments
+        tables[name] = np.column_stack([lines.alpha, lines.r, segments.start, segments.end])
     return np.array([tables[name][i] for name, i in owners]).reshape(-1, 6)
-
-
-def _table(found: Features) -> Array:
-    lines, segments = found.lines, found.segments
-    return np.column_stack([lines.alpha, lines.r, segments.start, segments.end])
 
 
 def _along(lines: Array, alpha: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
-from lidarcore.evaluation.repeatability.observations import OBSERVATION, Observations, one_sigma_areas
+from lidarcore.evaluation.repeatability.observations import OBSERVATION, Observations, covariances, root_det
 from lidarcore.evaluation.repeatability.scatter import LEAST, Scatter, scatter
 from lidarcore.evaluation.repeatability.summary import WHISKER, Box, Claim, FeatureScatter, verdict
 from lidarcore.evaluation.repeatability.wall_tracker import WallRow
@@ -50,7 +50,8 @@ class FeatureWindow:
         new = Observations(ids, np.full(len(ids), self._added), table[k, first, :2])
         oldest = len(self._records[0].table) if len(self) == self._records.maxlen else 0
         self._firsts = Observations.joined([self._firsts[oldest:], new])
-        self._records.append(_Record(table, _medians(one_sigma_areas(table))))
+        one_sigma_areas = np.pi * root_det(covariances(table))
+        self._records.append(_Record(table, _medians(one_sigma_areas)))
         self._added += 1
 
     def observations(self) -> Observations:

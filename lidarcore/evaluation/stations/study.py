@@ -52,7 +52,7 @@ class Figures(Columns):
         return cls(
             np.where(good, found.counts, 0.0)[some],
             np.where(good, found.hits[:, :, kind, LEVELS.index(0.95)], 0.0)[some],
-            np.where(scatters, found.claimed(kind), np.nan)[some],
+            np.where(scatters, found.claimed[..., kind], np.nan)[some],
             np.where(scatters, found.actual, np.nan)[some],
             window * numbers,
             station * numbers,

@@ -11,7 +11,7 @@ from lidarcore.arrays import Array
 from lidarcore.clusters import Clusters
 from lidarcore.errors import MotionError
 from lidarcore.features import Features
-from lidarcore.geometry import UncertainPose, check_covariance, inverse, relative
+from lidarcore.geometry import UncertainPose, as_pose_covariance, inverse, relative
 from lidarcore.localization import Estimate, Landmarks, Points, TrackingResult, Velocity, as_pose
 from lidarcore.localization.dead_reckoning import DeadReckoning
 from lidarcore.localization.deskewing import Distortion
@@ -95,8 +95,7 @@ class WholeScans:
         Raises LocalizationError if the pose is not finite or the map is built, CovarianceError if the covariance is not
         positive definite.
         """
-        check_covariance(covariance, "The pose's covariance")
-        told = UncertainPose(as_pose(pose, "pose"), np.asarray(covariance, np.float64))
+        told = UncertainPose(as_pose(pose, "pose"), as_pose_covariance(covariance, "The pose's covariance"))
         self._background.place(told.compose(UncertainPose(inverse(self._tie.pose), np.zeros((3, 3)))))
 
     def deskewed(self, scan: Scan) -> Scan:
