@@ -40,6 +40,14 @@ def _farthest(cells: Sequence[Sequence[Interval]]) -> float:
     )
 
 
+def _bars(row: Sequence[Interval], digits: int) -> list[Bar]:
+    """One for each method."""
+    return [
+        Bar(name, cell.value, cell.low, cell.high, cell.text(digits), f"m{m}")
+        for m, (name, cell) in enumerate(zip(NAMES, row, strict=True))
+    ]
+
+
 def figure3(result: ClusteringStudy) -> str:
     """Run time of each method and trajectory; of a scan in a table."""
     total = _of(result.values(lambda o: o.clustering_s + o.filter_s))
@@ -48,10 +56,7 @@ def figure3(result: ClusteringStudy) -> str:
         (
             trajectory,
             bars(
-                [
-                    Bar(name, cell.value, cell.low, cell.high, cell.text(2), f"m{m}")
-                    for m, (name, cell) in enumerate(zip(NAMES, row, strict=True))
-                ],
+                _bars(row, 2),
                 most,
                 least=least,
                 title=f"Run time by method, {trajectory}",
@@ -80,11 +85,7 @@ def figure4(result: ClusteringStudy) -> str:
     for t, trajectory in enumerate(TRAJECTORIES):
         rows: list[Bar | str] = []
         for mode in MODES:
-            rows.append(WORDS[mode])
-            rows += [
-                Bar(name, cell.value, cell.low, cell.high, cell.text(1), f"m{m}")
-                for m, (name, cell) in enumerate(zip(NAMES, cells[mode][t], strict=True))
-            ]
+            rows += [WORDS[mode], *_bars(cells[mode][t], 1)]
         panels.append((trajectory, bars(rows, most, title=f"Accumulated error by method, {trajectory}, m")))
     caption = (
         "Figure 4. Accumulated error, m: distance in y from the trajectory at the same x, summed over the scans of a "
