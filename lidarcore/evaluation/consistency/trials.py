@@ -6,8 +6,7 @@ from typing import Literal, cast
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
-from lidarcore.columns import Columns
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.compiled import kernel
 from lidarcore.corners import intersect
 from lidarcore.evaluation.consistency.places import Place

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
-from lidarcore.columns import Columns
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.evaluation.consistency.design import KINDS
 
 OBSERVATION = 10

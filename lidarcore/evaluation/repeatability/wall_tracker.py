@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
-from lidarcore.columns import Columns
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.features import Features
 from lidarcore.geometry import wrap
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import stdtrit
 
-from lidarcore.arrays import Array, Ints
-from lidarcore.columns import Columns
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.consistency.design import KINDS

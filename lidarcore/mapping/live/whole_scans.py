@@ -62,8 +62,6 @@ class WholeScans:
         self._extraction = extraction = extraction or ExtractionSettings()
         self._settings = MapperSettings().with_noise(extraction.noise)
         self._distortion, self._reckoning = Distortion(), DeadReckoning()
-        self._before: float | None = None  # stamp of the last scan
-        self._velocity: Velocity | None = None
         self._is_nowhere = False  # in a known map, as long as the pose was not found
         self._begin()
 
@@ -83,7 +81,10 @@ class WholeScans:
         return self._background.is_behind
 
     def path(self) -> Array:
-        """(T, 2) m: where the keyframes were taken, as the map has them now, and the newest scan."""
+        """(T, 2) m: where the keyframes were taken, as the map has them now, and the newest scan.
+
+        In a known map the last kilometres of a long drive.
+        """
         known = self._background.corrected
         newer = [pose.pose[:2] for pose in self._chain(known)[1:]]
         here = [] if self._here is None else [self._here.pose[:2]]
@@ -142,7 +143,8 @@ class WholeScans:
         self._tie = _HERE  # T_keyframe_sensor
         self._here: UncertainPose | None = None
         self._is_nowhere = False
-        self._before = self._velocity = None
+        self._before: float | None = None  # stamp of the last scan
+        self._velocity: Velocity | None = None
 
     def _begun(self) -> Background:
         if self._known is not None:

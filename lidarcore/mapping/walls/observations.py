@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from lidarcore.arrays import Array, Ints
-from lidarcore.columns import Columns
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.mapping.walls.parts import Part
 from lidarcore.mapping.walls.pieces import Pieces
 
