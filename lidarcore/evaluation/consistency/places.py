@@ -6,15 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.compiled import kernel
-from lidarcore.corners import intersect
-from lidarcore.evaluation.consistency.cramer_rao import bounded_line
+from lidarcore.evaluation.consistency.cramer_rao import bound_corners
 from lidarcore.geometry import unit_vectors
-from lidarcore.lines import LINE_FIELDS
 from lidarcore.noise import SensorNoise
 from lidarcore.simulation import random_pose
 from lidarcore.simulation.world import World
-from lidarcore.tables import CORNER_CONSISTENT, CORNER_FIELDS
 
 MIN_BEAMS, MIN_EXTENT = 8, 0.4  # a stretch of wall counts as seen from this many beams and metres on
 CLEARANCE = 0.4  # m, of the sensor from every wall
@@ -92,7 +88,7 @@ def look(world: World, joints: Array, pose: Array, noise: SensorNoise, beams: in
     lines = _lines(_turned(world.walls[:, 1] - world.walls[:, 0], turn)[wall], points[first])
     bounds = np.empty((len(j), 2, 2))
     variances = noise.sigma_range**2, noise.sigma_bearing**2
-    _bound_corners(bearings, first[pairs], count[pairs], lines[pairs], *variances, bounds)
+    bound_corners(bearings, first[pairs], count[pairs], lines[pairs], *variances, bounds)
     return Place(ranges, bearings, hit, first[pairs], count[pairs], wall[pairs], corners[j], bounds)
 
 
@@ -118,17 +114,3 @@ def _lines(along: Array, points: Array) -> Array:
     normal = tangent[:, ::-1] * [1, -1]
     r = (normal * points).sum(1)
     return np.column_stack([normal, r]) * np.where(r < 0, -1.0, 1.0)[:, None]
-
-
-@kernel
-def _bound_corners(
-    bearings: Array, first: Ints, count: Ints, lines: Array, v_rho: float, v_theta: float, bounds: Array
-) -> None:
-    rows, corner = np.empty((2, LINE_FIELDS)), np.empty(CORNER_FIELDS)
-    for p in range(len(first)):
-        for k in range(2):
-            a = first[p, k]
-            nx, ny, r = lines[p, k]
-            bounded_line(bearings[a : a + count[p, k]], nx, ny, r, v_rho, v_theta, rows[k])
-        intersect(rows[0], rows[1], corner)
-        bounds[p] = corner[CORNER_CONSISTENT : CORNER_CONSISTENT + 4].copy().reshape(2, 2)

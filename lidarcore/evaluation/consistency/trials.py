@@ -118,25 +118,16 @@ def _fit_known(
         for p in range(len(first)):
             for side in range(2):
                 a, b = first[p, side], first[p, side] + count[p, side]
-                if (
-                    side == 0 and p > 0 and first[p - 1, 1] == a
-                ):  # it was the second wall of the corner before
+                # It was the second wall of the corner before.
+                if side == 0 and p > 0 and first[p - 1, 1] == a:
                     fitted[0], status[0] = fitted[1], status[1]
                     continue
                 behind = np.any(rho[a:b] <= 0)
                 for f in range(fitters):
                     row = fitted[side, f]
                     # Inlined, not a kernel called: linked copies of one may round differently from process to process.
-                    fit = fit_piece(
-                        f,
-                        rho[a:b],
-                        c[a:b],
-                        s[a:b],
-                        noise,
-                        (work[0, a:b], work[1, a:b], work[2, a:b]),
-                        (True, True),
-                        row,
-                    )
+                    scratch = (work[0, a:b], work[1, a:b], work[2, a:b])
+                    fit = fit_piece(f, rho[a:b], c[a:b], s[a:b], noise, scratch, (True, True), row)
                     status[side, f] = NOT_FINITE if behind else fit
             for f in range(fitters):
                 out[p, k, f] = np.nan

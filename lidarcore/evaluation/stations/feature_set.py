@@ -1,6 +1,6 @@
 """What one scan says of walls and corners, ready to be compared with what another says from elsewhere."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -45,14 +45,8 @@ class FeatureSet:
         if not sigma:
             return self
         added = sigma**2 * self._unit_systematic()
-        return FeatureSet(
-            self.lines,
-            self.ends,
-            self.covariances + added,
-            self.corners,
-            self.corner_covariances + self._of_corners(added),
-            self.walls,
-        )
+        corner_covariances = self.corner_covariances + self._of_corners(added)
+        return replace(self, covariances=self.covariances + added, corner_covariances=corner_covariances)
 
     def _unit_systematic(self) -> Array:
         """(M, 2, 2) of alpha and r, for a sigma of 1 m."""
