@@ -9,8 +9,7 @@ from numpy.typing import ArrayLike
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
 from lidarcore.files import replacing_all
-from lidarcore.mapping.export.picture import map_png
-from lidarcore.mapping.export.plan import plan_dxf, plan_svg
+from lidarcore.mapping.export.drawings import map_png, plan_dxf, plan_svg
 from lidarcore.mapping.export.tables import walls_csv, walls_geojson
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.grid.ros_map import ros_pgm, ros_yaml
