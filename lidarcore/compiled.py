@@ -49,8 +49,7 @@ def _compile(function: Function, **options: Any) -> Function:
     compiled = numba.njit(nogil=True, error_model="numpy", **options)(function)
     _OPTIONS[function] = options
     compiled._cache = _LazyCache(function)
-    result: Function = compiled
-    return result
+    return compiled
 
 
 class _LazyCache:

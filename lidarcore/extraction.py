@@ -125,10 +125,8 @@ def _extract(
     ring, work = Ring(floats[:3], indices[0]), floats[3:]
     pieces, seen = _segment(ranges, bearings, settings, ring, work[0], indices[1:])
     # Of P pieces every one makes a segment or a rejection, and so does every pair of neighbours: 2 P rows are enough.
-    tables, counts = (
-        np.empty((len(fitters), 2 * len(pieces.first), FIELDS)),
-        np.empty((len(fitters), 3), np.int64),
-    )
+    tables = np.empty((len(fitters), 2 * len(pieces.first), FIELDS))
+    counts = np.empty((len(fitters), 3), np.int64)
     for f in range(len(fitters)):
         table, backwards = tables[f], tables[f, ::-1]
         n, rejected = fit_pieces(
@@ -169,10 +167,8 @@ class _Buffers(threading.local):
     def of(self, beams: int) -> tuple[Array, Ints]:
         """Buffers for a scan of this many beams, and for the ring unrolled."""
         if self.floats.shape[1] < 2 * beams + 2:
-            self.floats, self.indices = (
-                np.empty((3 + WORK, 2 * beams + 2)),
-                np.empty((7, 2 * beams + 2), np.int64),
-            )
+            self.floats = np.empty((3 + WORK, 2 * beams + 2))
+            self.indices = np.empty((7, 2 * beams + 2), np.int64)
         return self.floats, self.indices
 
 

@@ -29,6 +29,11 @@ def number(low: float, high: float, unit: str, text: str, *, default: Any = ...)
     )
 
 
+def whole(low: int, high: int, text: str, *, default: Any = ...) -> Any:
+    """A whole number from low to high, with its meaning."""
+    return Field(default, ge=low, le=high, description=text, kw_only=None if default is ... else True)
+
+
 def plainly(settings: type[T]) -> type[T]:
     """Names and defaults alone for the signature, with which `help` begins: with all bounds it fills a screen."""
     full = signature(settings)

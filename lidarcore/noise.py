@@ -111,8 +111,7 @@ class SensorNoise:
 
     def range_variances(self, ranges: NDArray[np.float64]) -> NDArray[np.float64]:
         """Variances m² of ranges (N,) m: sigma_range² + (range_growth rho²)²."""
-        variances: NDArray[np.float64] = self.sigma_range**2 + (self.range_growth * ranges**2) ** 2
-        return variances
+        return self.sigma_range**2 + (self.range_growth * ranges**2) ** 2
 
     def point_covariances(
         self, ranges: NDArray[np.float64], bearings: NDArray[np.float64]

@@ -99,8 +99,7 @@ class Scan:
     @cached_property
     def xy(self) -> Array:
         """(N, 2) m, sensor frame; NaN where there was no return."""
-        xy: Array = self.ranges[:, None] * unit_vectors(self.bearings)
-        return xy
+        return self.ranges[:, None] * unit_vectors(self.bearings)
 
 
 def as_row(values: ArrayLike, name: str) -> Array:

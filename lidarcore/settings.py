@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from lidarcore.fields import number, plainly, settings
+from lidarcore.fields import number, plainly, settings, whole
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise
 
@@ -48,27 +48,19 @@ class ExtractionSettings:
         "walls go on across wider gaps",
         default=0.3,
     )
-    min_points: Annotated[
-        int,
-        Field(
-            ge=2,
-            le=1000,
-            description="a segment needs at least this many points. More: fewer short or far walls",
-        ),
-    ] = 6
+    min_points: int = whole(
+        2, 1000, "a segment needs at least this many points. More: fewer short or far walls", default=6
+    )
     min_length: float = number(
         0.0, 10.0, "m", "a segment must be at least this long. More: short walls are rejected", default=0.2
     )
-    corner_angle: Annotated[
-        float,
-        Field(
-            ge=0.02,
-            le=1.57,
-            allow_inf_nan=False,
-            description="two walls make a corner if the angle between them is at least this. More: fewer flat corners",
-            json_schema_extra={"unit": "rad"},
-        ),
-    ] = 0.35
+    corner_angle: float = number(
+        0.02,
+        1.57,
+        "rad",
+        "two walls make a corner if the angle between them is at least this. More: fewer flat corners",
+        default=0.35,
+    )
     corner_gap: float = number(
         0.01,
         2.0,

@@ -7,9 +7,9 @@ from itertools import islice
 import numpy as np
 
 from lidarcore.evaluation.consistency.design import KINDS, room
+from lidarcore.evaluation.consistency.places import places
 from lidarcore.evaluation.consistency.trials import simulate
 from lidarcore.evaluation.intervals import Interval, ratio, share
-from lidarcore.evaluation.repeatability.places import places
 from lidarcore.experiments.corner_study import Method
 from lidarcore.experiments.paper_rooms import BEAMS
 from lidarcore.geometry import fuse, squared_mahalanobis

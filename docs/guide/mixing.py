@@ -5,8 +5,8 @@ from itertools import islice
 import numpy as np
 
 from lidarcore.evaluation.consistency.design import room
+from lidarcore.evaluation.consistency.places import Place, places
 from lidarcore.evaluation.intervals import LEVEL, Interval, share
-from lidarcore.evaluation.repeatability.places import Place, places
 from lidarcore.experiments.corner_study import SAME
 from lidarcore.experiments.paper_rooms import BEAMS
 from lidarcore.extraction import extract

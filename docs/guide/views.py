@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.evaluation.consistency.figures import GATES, LEVELS
+from lidarcore.evaluation.consistency.places import Place, look, shared_ends
 from lidarcore.evaluation.intervals import LEVEL, Interval, share
-from lidarcore.evaluation.repeatability.places import Place, look, shared_ends
 from lidarcore.experiments.corner_study import Method, simulated
 from lidarcore.experiments.paper_rooms import BEAMS, NOISE
 from lidarcore.geometry import contains

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Self, Unpack
+from typing import Any, Unpack
 from urllib.parse import quote
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from lidarcore.client.answers import PastPose, Pose, SeenCorner, Which
 from lidarcore.client.connection import Connection, given
+from lidarcore.closing import Closing
 from lidarcore.errors import MapFileError, UnknownLandmarkError
 from lidarcore.files import replacing
 from lidarcore.landmarks import Box, Circle, Landmark, Metric, Neighbour, Session
@@ -19,7 +20,7 @@ _PAGE = 1000  # landmarks and states asked for at a time
 _MEDIA_TYPES = {"json": "application/json", "csv": "text/csv", "geojson": "application/geo+json"}
 
 
-class Client:
+class Client(Closing):
     """Speaks to the REST API and the WebSocket of one server.
 
     Every method raises ServerUnreachableError if nothing answers, and ClientError if the server refuses, with its
@@ -31,12 +32,6 @@ class Client:
     ) -> None:
         """`url` and `token` as the server printed them when it started; `timeout` in s."""
         self._connection = Connection(url, token, timeout)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the connection."""
@@ -188,23 +183,19 @@ class Client:
 
         Switched on by `client.set(repeatability={"running": True})` while the sensor stands still.
         """
-        found: dict[str, Any] = self._connection.get("/repeatability")
-        return found
+        return self._connection.get("/repeatability")
 
     def calibrate(self, scans: int = 100) -> dict[str, Any]:
         """Begin to measure the noise of a sensor that stands still, from its next scans; see `calibration`."""
-        state: dict[str, Any] = self._connection.send("POST", "/calibration", {"scans": scans})
-        return state
+        return self._connection.send("POST", "/calibration", {"scans": scans})
 
     def calibration(self) -> dict[str, Any]:
         """The calibration under way, or the last one: as GET /api/v1/calibration describes."""
-        state: dict[str, Any] = self._connection.get("/calibration")
-        return state
+        return self._connection.get("/calibration")
 
     def profiles(self) -> list[dict[str, Any]]:
         """The noise profiles that were saved: name, noise, or the problem with the file."""
-        profiles: list[dict[str, Any]] = self._connection.get("/profiles")["profiles"]
-        return profiles
+        return self._connection.get("/profiles")["profiles"]
 
     def save_profile(
         self,
@@ -232,13 +223,11 @@ class Client:
 
     def settings(self) -> dict[str, Any]:
         """All settings, section by section."""
-        settings: dict[str, Any] = self._connection.get("/settings")
-        return settings
+        return self._connection.get("/settings")
 
     def set(self, **sections: Mapping[str, Any]) -> dict[str, Any]:
         """Change settings: `client.set(navigation={"mode": "slam"})`; None puts a default back. All settings then."""
-        settings: dict[str, Any] = self._connection.send("PATCH", "/settings", sections)
-        return settings
+        return self._connection.send("PATCH", "/settings", sections)
 
     def frames(self, points: bool = False) -> Iterator[dict[str, Any]]:
         """Frames as they are made, each as GET /api/v1/frame describes; a slow client gets fewer, never old ones."""

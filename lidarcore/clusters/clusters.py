@@ -81,5 +81,4 @@ def _of_sampling(shifts: Array) -> Array:
     Each end of the object is uniformly distributed over one step beyond its outermost point; a whole step would
     shift the mean by what is given. On a flat face with steps s this is s² / 24.
     """
-    covariances: Array = np.einsum("kei,kej->kij", shifts, shifts) / 12
-    return covariances
+    return np.einsum("kei,kej->kij", shifts, shifts) / 12

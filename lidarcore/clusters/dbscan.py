@@ -13,5 +13,4 @@ def label(points: Array, eps: float, min_points: int) -> Ints:
     """
     from sklearn.cluster import DBSCAN  # here, for it takes a second to import
 
-    labels: Ints = DBSCAN(eps=eps, min_samples=min_points).fit_predict(points).astype(np.int64)
-    return labels
+    return DBSCAN(eps=eps, min_samples=min_points).fit_predict(points).astype(np.int64)

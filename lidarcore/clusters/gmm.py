@@ -29,8 +29,7 @@ def label(points: Array, k: int | None, k_max: int, noise: SensorNoise) -> Ints:
         mixtures = [_mixture(points, k, (2 * noise.sigma_range) ** 2) for k in numbers]
         criteria = np.array([mixture.bic(points) for mixture in mixtures])
     chosen = mixtures[int(np.argmax(criteria <= criteria.min() + VERY_STRONG))]
-    labels: Ints = chosen.predict(points).astype(np.int64)
-    return labels
+    return chosen.predict(points).astype(np.int64)
 
 
 def _mixture(points: Array, k: int, floor: float) -> "GaussianMixture":

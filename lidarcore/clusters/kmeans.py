@@ -29,8 +29,7 @@ def label(points: Array, k: int | None, k_max: int) -> Ints:
 def _partition(points: Array, k: int) -> Ints:
     from sklearn.cluster import KMeans  # here, for it takes a second to import
 
-    labels: Ints = KMeans(k, n_init=4, tol=0, random_state=0).fit_predict(points).astype(np.int64)
-    return labels
+    return KMeans(k, n_init=4, tol=0, random_state=0).fit_predict(points).astype(np.int64)
 
 
 def _silhouette(points: Array, labels: Ints) -> float:

@@ -6,7 +6,7 @@ from typing import Annotated
 from pydantic import Field, field_validator
 
 from lidarcore.clusters.registry import CLUSTERERS
-from lidarcore.fields import number, settings
+from lidarcore.fields import number, settings, whole
 from lidarcore.noise import SensorNoise
 
 
@@ -35,34 +35,28 @@ class ClusterSettings:
         "dbscan: points at most this far apart are neighbours. More: fewer, larger clusters",
         default=0.3,
     )
-    min_points: Annotated[
-        int,
-        Field(
-            ge=2,
-            le=1000,
-            description="a cluster needs at least this many points, as for dbscan a dense neighbourhood does. "
-            "More: small things are left out",
-        ),
-    ] = 3
-    k: Annotated[
-        int | None,
-        Field(
-            ge=1,
-            le=200,
-            description="kmeans, gmm: number of clusters, fewer where there are fewer points; none to choose it for "
-            "every scan from 1 to k_max, kmeans by the silhouette, gmm by the Bayesian information criterion. "
-            "More: smaller clusters",
-        ),
-    ] = None
-    k_max: Annotated[
-        int,
-        Field(
-            ge=1,
-            le=50,
-            description="kmeans, gmm: most clusters to choose from. "
-            "More: more clusters where there are many things, and more time",
-        ),
-    ] = 12
+    min_points: int = whole(
+        2,
+        1000,
+        "a cluster needs at least this many points, as for dbscan a dense neighbourhood does. "
+        "More: small things are left out",
+        default=3,
+    )
+    k: int | None = whole(
+        1,
+        200,
+        "kmeans, gmm: number of clusters, fewer where there are fewer points; none to choose it for "
+        "every scan from 1 to k_max, kmeans by the silhouette, gmm by the Bayesian information criterion. "
+        "More: smaller clusters",
+        default=None,
+    )
+    k_max: int = whole(
+        1,
+        50,
+        "kmeans, gmm: most clusters to choose from. "
+        "More: more clusters where there are many things, and more time",
+        default=12,
+    )
     max_range: float | None = number(
         0.1,
         1000.0,

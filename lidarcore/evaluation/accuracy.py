@@ -51,12 +51,8 @@ class Accuracy:
         return float(np.sqrt(np.mean(np.square(self.corner_errors))))
 
 
-@dataclass(frozen=True, slots=True)
-class _View:
-    """A stretch of beams (n,) that meet one wall."""
-
-    wall: int
-    beams: Ints
+_View = tuple[int, Ints]
+"""A wall, and a stretch of beams (n,) that meet it."""
 
 
 def measure_accuracy(sigma_range: float, scans: int, seed: int) -> Accuracy:
@@ -85,13 +81,13 @@ def _count(
     result.segments += len(segments)
     result.matched += int(on_wall.any(1).sum())
     views = _views(walls, hit, bearings)
-    for view in views:
-        finders = covered[:, view.beams].sum(1) * 2 > len(view.beams)
+    for wall, beams in views:
+        finders = covered[:, beams].sum(1) * 2 > len(beams)
         result.visible += 1
-        result.found += int((finders & on_wall[:, view.wall]).any())
-        if {0, len(hit) - 1} <= set(view.beams):
+        result.found += int((finders & on_wall[:, wall]).any())
+        if {0, len(hit) - 1} <= set(beams):
             result.seam_walls += 1
-            parts = on_wall[:, view.wall] & covered[:, view.beams].any(1)
+            parts = on_wall[:, wall] & covered[:, beams].any(1)
             result.seam_splits += int(parts.sum() > 1 and not (parts & covered[:, 0] & covered[:, -1]).any())
     for corner in _visible_corners(walls, views, len(hit)):
         result.visible_corners += 1
@@ -108,16 +104,14 @@ def _lies_on(start: Array, end: Array, walls: Array, tolerance: float) -> Bools:
     normal = left_of(tangent)
     across = [np.abs(((p[:, None] - origin) * normal).sum(-1)) for p in (start, end)]
     middle = (((start + end)[:, None] / 2 - origin) * tangent).sum(-1)
-    near: Bools = (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
-    return near
+    return (np.maximum(*across) < tolerance) & (middle > 0) & (middle < length)
 
 
 def _covered_beams(segments: Segments, beams: int) -> Bools:
     """(M, N) true where a segment covers a beam."""
     first, last = segments.first_beam[:, None], segments.last_beam[:, None]
     k = np.arange(beams)
-    inside: Bools = np.where(first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last))
-    return inside
+    return np.where(first <= last, (first <= k) & (k <= last), (first <= k) | (k <= last))
 
 
 def _views(walls: Array, hit: Ints, bearings: Array) -> list[_View]:
@@ -128,7 +122,7 @@ def _views(walls: Array, hit: Ints, bearings: Array) -> list[_View]:
         beams = np.arange(start, stop) % len(hit)
         wall = int(hit[start])
         if wall >= 0 and len(beams) >= MIN_BEAMS and _extent(walls[wall], bearings[beams]) >= MIN_EXTENT:
-            views.append(_View(wall, beams))
+            views.append((wall, beams))
     return views
 
 
@@ -143,9 +137,7 @@ def _extent(wall: Array, bearings: Array) -> float:
 def _visible_corners(walls: Array, views: list[_View], beams: int) -> list[Array]:
     """Ends that two walls share where their views are neighbours."""
     corners = []
-    for view, other in zip(views, views[1:] + views[:1], strict=True):
-        if (view.beams[-1] + 1) % beams == other.beams[0]:
-            corners += [
-                p for p in walls[view.wall] for q in walls[other.wall] if np.allclose(p, q, atol=1e-9)
-            ]
+    for (one, of_one), (other, of_other) in zip(views, views[1:] + views[:1], strict=True):
+        if (of_one[-1] + 1) % beams == of_other[0]:
+            corners += [p for p in walls[one] for q in walls[other] if np.allclose(p, q, atol=1e-9)]
     return corners

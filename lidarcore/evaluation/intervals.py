@@ -34,9 +34,10 @@ class Interval:
         value = f"{factor * self.value:.{digits}f}".replace("-", "−")
         return f"{value} ± {factor * self.half_width:.{digits}f}" if np.isfinite(self.half_width) else value
 
-    def span(self, digits: int) -> str:
+    def span(self, digits: int, factor: float = 1.0, to: str = "–") -> str:
         """'1.23 (1.19–1.26)': the value and the ends of its interval."""
-        return f"{self.value:.{digits}f} ({self.low:.{digits}f}–{self.high:.{digits}f})"
+        value, low, high = (f"{factor * x:.{digits}f}" for x in (self.value, self.low, self.high))
+        return f"{value} ({low}{to}{high})"
 
     def root(self) -> "Interval":
         """The interval of the square root; an end below 0, which chance can make, becomes 0."""
@@ -107,5 +108,4 @@ def _standard_error(numerators: Array, denominators: Array, value: ArrayLike) ->
     """(...) of ratios with that value (...), from blocks (..., B)."""
     blocks = numerators.shape[-1]
     scatter = np.square(numerators - np.expand_dims(value, -1) * denominators).sum(-1)
-    error: Array = np.sqrt(scatter * blocks / (blocks - 1)) / denominators.sum(-1)
-    return error
+    return np.sqrt(scatter * blocks / (blocks - 1)) / denominators.sum(-1)

@@ -81,6 +81,13 @@ def judged(claim: str, measured: str, verdict: Agreement, why: str = "") -> Clai
     return claim, f"{measured} {why}" if why and verdict is False else measured, verdict
 
 
+def on_coverage(claim: str, measured: str, known: bool, one: Interval, other: Interval, why: str) -> Claim:
+    """A claim that one share of corners within 95 % ellipses is better than another; open if no noise is known."""
+    if not known:
+        return claim, f"{measured} {NOISE_ASSUMED}", None
+    return judged(claim, measured, nearer(one, other, 0.95), why)
+
+
 def not_comparable(claim: str, measured: str, why: str = NO_ROOM) -> Claim:
     """A figure of the paper that belongs to its rooms, sensor or computer."""
     return claim, f"{measured} {why}", NOT_COMPARABLE
@@ -103,4 +110,4 @@ def _median(values: Array) -> tuple[float, float, float]:
 def in_words(figure: Interval, factor: float = 1.0) -> str:
     """A figure with its confidence interval."""
     digits = 1 if factor == 100 else 3 if figure.value < 2 else 2
-    return f"{factor * figure.value:.{digits}f} ({factor * figure.low:.{digits}f} to {factor * figure.high:.{digits}f})"
+    return figure.span(digits, factor, " to ")

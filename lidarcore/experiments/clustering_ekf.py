@@ -9,7 +9,7 @@ while the objects are out of sight for some seconds.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from itertools import islice, pairwise
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.clusters import CLUSTERERS, Clusters, ClusterSettings, cluster
 from lidarcore.evaluation.workers import run_all
-from lidarcore.experiments.tracks import Errors, Track, dead_reckoned, errors, filtered
+from lidarcore.experiments.tracks import Drive, Errors, Track, dead_reckoned, errors, filtered
 from lidarcore.geometry import relative
 from lidarcore.localization import LocalizationSettings, OdometryNoise, deskew
 from lidarcore.noise import SensorNoise
@@ -25,7 +25,7 @@ from lidarcore.scan import Scan
 from lidarcore.simulation.posts import scattered
 from lidarcore.simulation.robot import RATE, SimulatedRobot
 from lidarcore.simulation.settings import OdometryError, SimulationSettings
-from lidarcore.simulation.worlds import Place, hall, trajectories, way
+from lidarcore.simulation.worlds import hall, trajectories, way
 
 METHODS = tuple(CLUSTERERS)
 TRAJECTORIES = tuple(trajectories())
@@ -89,24 +89,6 @@ class Outcome:
     filter_s: float
     errors: dict[str, Errors]
     tracks: dict[str, Track]
-
-
-@dataclass(frozen=True, eq=False)
-class Drive:
-    """What the robot of one run perceived on one trajectory, and what there was."""
-
-    place: Place
-    scans: Sequence[Scan]
-
-    @cached_property
-    def truth(self) -> Array:
-        """T_world_sensor (N, 3) at each scan."""
-        return np.array([scan.truth for scan in self.scans])
-
-    @cached_property
-    def odometry(self) -> Array:
-        """T_odom_sensor (N, 3) at each scan; the start is the true one."""
-        return np.array([scan.odometry for scan in self.scans])
 
 
 @dataclass(frozen=True, eq=False)

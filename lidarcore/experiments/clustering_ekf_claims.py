@@ -5,10 +5,8 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.clusters import CLUSTERERS
 from lidarcore.evaluation.intervals import Interval, mean
+from lidarcore.experiments.claim_rules import Claim
 from lidarcore.experiments.clustering_ekf import METHODS, ClusteringStudy
-
-Claim = tuple[str, str, bool | None]
-"""What the paper says, what was measured, and whether that agrees; None where the runs leave it open."""
 
 _DBSCAN = METHODS.index("dbscan")
 _OTHERS = [m for m in range(len(METHODS)) if m != _DBSCAN]

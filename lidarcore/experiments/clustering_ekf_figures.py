@@ -15,10 +15,9 @@ from lidarcore.experiments.clustering_ekf import (
     TRAJECTORIES,
     ClusteringStudy,
     Design,
-    Drive,
     simulate,
 )
-from lidarcore.experiments.tracks import Track
+from lidarcore.experiments.tracks import Drive, Track
 from lidarcore.geometry import act, unit_vectors
 from lidarcore.reporting import Bar, Map, bars, chart
 
@@ -41,6 +40,14 @@ def _farthest(cells: Sequence[Sequence[Interval]]) -> float:
     )
 
 
+def _bars(row: Sequence[Interval], digits: int) -> list[Bar]:
+    """One for each method."""
+    return [
+        Bar(name, cell.value, cell.low, cell.high, cell.text(digits), f"m{m}")
+        for m, (name, cell) in enumerate(zip(NAMES, row, strict=True))
+    ]
+
+
 def figure3(result: ClusteringStudy) -> str:
     """Run time of each method and trajectory; of a scan in a table."""
     total = _of(result.values(lambda o: o.clustering_s + o.filter_s))
@@ -49,10 +56,7 @@ def figure3(result: ClusteringStudy) -> str:
         (
             trajectory,
             bars(
-                [
-                    Bar(name, cell.value, cell.low, cell.high, cell.text(2), f"m{m}")
-                    for m, (name, cell) in enumerate(zip(NAMES, row, strict=True))
-                ],
+                _bars(row, 2),
                 most,
                 least=least,
                 title=f"Run time by method, {trajectory}",
@@ -81,11 +85,7 @@ def figure4(result: ClusteringStudy) -> str:
     for t, trajectory in enumerate(TRAJECTORIES):
         rows: list[Bar | str] = []
         for mode in MODES:
-            rows.append(WORDS[mode])
-            rows += [
-                Bar(name, cell.value, cell.low, cell.high, cell.text(1), f"m{m}")
-                for m, (name, cell) in enumerate(zip(NAMES, cells[mode][t], strict=True))
-            ]
+            rows += [WORDS[mode], *_bars(cells[mode][t], 1)]
         panels.append((trajectory, bars(rows, most, title=f"Accumulated error by method, {trajectory}, m")))
     caption = (
         "Figure 4. Accumulated error, m: distance in y from the trajectory at the same x, summed over the scans of a "
@@ -194,7 +194,4 @@ def _within(drive: Drive, design: Design) -> Array:
     """Which objects are in view at the end."""
     x, y, heading = drive.truth[-1]
     to_post = (_posts(drive) - [x, y]) @ [1, 1j] * np.exp(-1j * heading)
-    near: Array = (np.abs(to_post) < design.max_range) & (
-        np.abs(np.angle(to_post)) < design.field_of_view / 2
-    )
-    return near
+    return (np.abs(to_post) < design.max_range) & (np.abs(np.angle(to_post)) < design.field_of_view / 2)

@@ -9,9 +9,9 @@ import numpy as np
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
+from lidarcore.evaluation.consistency.places import Place
 from lidarcore.evaluation.consistency.trials import Segmentation, Trials, simulate
 from lidarcore.evaluation.intervals import LEVEL, Interval, ratio, share
-from lidarcore.evaluation.repeatability.places import Place
 from lidarcore.extraction import compare
 from lidarcore.features import Corners
 from lidarcore.geometry import contains
@@ -47,8 +47,7 @@ class CornerStudy:
 
     def claimed(self, fitter: str, kind: Covariance) -> Array:
         """(P, 2) m, standard deviations of x and y of `claims`."""
-        sigmas: Array = np.sqrt(np.diagonal(self.claims(fitter, kind), axis1=1, axis2=2))
-        return sigmas
+        return np.sqrt(np.diagonal(self.claims(fitter, kind), axis1=1, axis2=2))
 
     def claims(self, fitter: str, kind: Covariance) -> Array:
         """(P, 2, 2) m², covariances as claimed: of each corner from the scan that claims the median area."""
@@ -56,21 +55,18 @@ class CornerStudy:
         areas = _areas(covariances)
         found = np.isfinite(areas).sum(1)
         typical = np.argsort(areas, axis=1)[np.arange(len(areas)), (found - 1) // 2]  # NaN come last
-        claimed: Array = covariances[np.arange(len(areas)), typical]
-        return claimed
+        return covariances[np.arange(len(areas)), typical]
 
     def scatter(self, fitter: str) -> Array:
         """(P, 2) m, RMS error in x and y."""
-        rms: Array = np.sqrt(np.diagonal(self.scattered(fitter), axis1=1, axis2=2))
-        return rms
+        return np.sqrt(np.diagonal(self.scattered(fitter), axis1=1, axis2=2))
 
     @cached_property
     def bound(self) -> Array:
         """(P, 2) m, the least standard deviations of x and y that are possible; NaN for a recording."""
         if self.bounds is None:
             return np.full((len(self.corners), 2), np.nan)
-        sigmas: Array = np.sqrt(np.diagonal(self.bounds, axis1=1, axis2=2))
-        return sigmas
+        return np.sqrt(np.diagonal(self.bounds, axis1=1, axis2=2))
 
     def below_bound(self, fitter: str) -> int:
         """Number of corners whose published ellipse has a smaller area than any honest one can have."""
@@ -81,21 +77,18 @@ class CornerStudy:
     def scan_areas(self, fitter: str, kind: Covariance) -> Array:
         """(K,) m², the median of each scan's one-sigma ellipses, of scans in which every fitter found a corner."""
         areas = _areas(self.trials[fitter, kind].covariances)
-        medians: Array = np.nanmedian(areas[:, self._with_corners], axis=0)
-        return medians
+        return np.nanmedian(areas[:, self._with_corners], axis=0)
 
     @cached_property
     def _with_corners(self) -> Bools:
         found = [np.isfinite(trials.errors[..., 0]).any(0) for trials in self.trials.values()]
-        every: Bools = np.all(found, axis=0)
-        return every
+        return np.all(found, axis=0)
 
     def scattered(self, fitter: str) -> Array:
         """(P, 2, 2) m², mean square errors: what a true covariance would be."""
         e = self.trials[fitter, "published"].errors
         found = np.isfinite(e[..., 0]).sum(1)
-        squares: Array = np.einsum("pki,pkj->pij", np.nan_to_num(e), np.nan_to_num(e)) / found[:, None, None]
-        return squares
+        return np.einsum("pki,pkj->pij", np.nan_to_num(e), np.nan_to_num(e)) / found[:, None, None]
 
     def actual_area(self, fitter: str) -> float:
         """m², the median over corners of the one-sigma ellipse of the true scatter."""
@@ -147,8 +140,7 @@ class CornerStudy:
 def _areas(covariances: Array) -> Array:
     """m², of the one-sigma ellipses."""
     xx, xy, yy = covariances[..., 0, 0], covariances[..., 0, 1], covariances[..., 1, 1]
-    areas: Array = np.pi * np.sqrt(xx * yy - xy * xy)
-    return areas
+    return np.pi * np.sqrt(xx * yy - xy * xy)
 
 
 def simulated(
@@ -158,13 +150,9 @@ def simulated(
     rng = np.random.default_rng(seed)
     trials = simulate([place], segmentation, settings, scans, rng)
     return CornerStudy(
-        {(name, kind): _clockwise(trials[name, kind]) for name in FITTERS for kind in KINDS},
+        {(name, kind): trials[name, kind][::-1] for name in FITTERS for kind in KINDS},  # clockwise
         place.bounds[::-1],
     )
-
-
-def _clockwise(trials: Trials) -> Trials:
-    return Trials(trials.errors[::-1], trials.covariances[::-1], trials.bounds[::-1], trials.corners[::-1])
 
 
 def recorded(scans: Sequence[Scan], settings: ExtractionSettings, fitters: Sequence[str]) -> CornerStudy:

@@ -7,7 +7,7 @@ import numpy as np
 from lidarcore import reporting
 from lidarcore.arrays import Array
 from lidarcore.evaluation.consistency.design import KINDS
-from lidarcore.evaluation.intervals import Interval
+from lidarcore.experiments.claim_rules import in_words
 from lidarcore.experiments.corner_study import CornerStudy
 from lidarcore.experiments.environments import Environment
 from lidarcore.lines import FITTERS
@@ -50,10 +50,10 @@ def honesty(environment: Environment, fitters: Sequence[str]) -> str:
         [
             FITTERS[name].title,
             segments,
-            _share(study.found(name)),
-            _ratio(study.rms_ratio(name, fitters[0])),
+            in_words(study.found(name), 100),
+            study.rms_ratio(name, fitters[0]).span(3, to=" to "),
             "" if study.bounds is None else f"{100 * study.bias(name):.0f}",
-            *(_share(study.coverage(name, kind)) for kind in KINDS),
+            *(in_words(study.coverage(name, kind), 100) for kind in KINDS),
             *(f"{1e6 * np.median(study.scan_areas(name, kind)):.0f}" for kind in KINDS),
             f"{1e6 * study.actual_area(name):.0f}",
         ]
@@ -102,8 +102,7 @@ def _maps(environment: Environment, styles: Mapping[str, str]) -> list[tuple[str
 
 def _aside(corners: Array) -> Array:
     """Places for the numbers of corners: a little farther from the sensor, where they do not hide corners."""
-    away: Array = corners * (1 + 0.35 / np.linalg.norm(corners, axis=1, keepdims=True))
-    return away
+    return corners * (1 + 0.35 / np.linalg.norm(corners, axis=1, keepdims=True))
 
 
 def methods(fitters: Sequence[str]) -> str:
@@ -118,11 +117,3 @@ def legend(styles: Mapping[str, str]) -> list[tuple[str, str]]:
 
 def _short(fitter: str) -> str:
     return FITTERS[fitter].title.split(",")[0]
-
-
-def _share(figure: Interval) -> str:
-    return f"{100 * figure.value:.1f} ({100 * figure.low:.1f} to {100 * figure.high:.1f})"
-
-
-def _ratio(figure: Interval) -> str:
-    return f"{figure.value:.3f} ({figure.low:.3f} to {figure.high:.3f})"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from lidarcore.experiments import cwlf_timing as timing
 from lidarcore.experiments.cwlf_timing import Times, Uncertainty
-from lidarcore.experiments.environments import Design, Environment, look_around, look_at
+from lidarcore.experiments.environments import Design, Environment, look_around
 from lidarcore.experiments.paper_rooms import CWLF_ROOMS
 from lidarcore.scan import Scan
 
@@ -46,25 +46,16 @@ def run(
     All but the times is the same for the same design, whatever the number of workers.
     Raises EvaluationError if the recording cannot be used.
     """
-    environments = (
-        look_around(CWLF_ROOMS, design, workers, done)
-        if recording is None
-        else look_at(recording, design, FITTERS)
-    )
-    result = CwlfStudy(
-        design, environments, *(({}, {}, {}) if recording is not None else _of_chosen_corners(design))
-    )
+    environments = look_around(CWLF_ROOMS, FITTERS, design, workers, recording, done)
+    if recording is not None:
+        result = CwlfStudy(design, environments, {}, {}, {})
+    else:
+        result = _with_chosen_corners(design, environments)
     done()
     return result
 
 
-def _of_chosen_corners(
-    design: Design,
-) -> tuple[
-    dict[tuple[str, int], Times],
-    dict[tuple[str, str, int], Times],
-    dict[tuple[str, str, int], Uncertainty],
-]:
+def _with_chosen_corners(design: Design, environments: Sequence[Environment]) -> CwlfStudy:
     noise, repeats, draws = design.noise, min(design.scans // 5, 50), design.scans
     growing = {n: timing.walls_of(CWLF_ROOMS[0], noise, n) for n in MEASUREMENTS}
     cells = [
@@ -73,7 +64,9 @@ def _of_chosen_corners(
         for name in FITTERS
         for n in COMPARED
     ]
-    return (
+    return CwlfStudy(
+        design,
+        environments,
         {
             (name, n): timing.times(name, walls, noise, repeats)
             for n, walls in growing.items()

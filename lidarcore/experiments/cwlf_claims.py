@@ -7,15 +7,14 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.experiments.claim_rules import (
-    NOISE_ASSUMED,
     Claim,
     as_large,
     below,
     every,
     in_words,
     judged,
-    nearer,
     not_comparable,
+    on_coverage,
     percentages,
 )
 from lidarcore.experiments.cwlf import COMPARED, MEASUREMENTS, CwlfStudy
@@ -117,12 +116,9 @@ def _of_realism(environment: Environment, result: CwlfStudy) -> Claim:
         f"% inside that of Arras-Siegwart, {in_words(study.coverage('cwlf', 'consistent'), 100)} % inside CWLF's "
         f"consistent one.{bound}"
     )
-    if study.bounds is None and result.design.assumed:
-        return claim, f"{measured} {NOISE_ASSUMED}", None
-    return judged(
-        claim, measured, nearer(cwlf, other, 0.95),
-        "Variances for an x that is known leave out most of what range noise does to an oblique wall.",
-    )  # fmt: skip
+    why = "Variances for an x that is known leave out most of what range noise does to an oblique wall."
+    known = study.bounds is not None or not result.design.assumed
+    return on_coverage(claim, measured, known, cwlf, other, why)
 
 
 def _of_times(result: CwlfStudy) -> Iterator[Claim]:

@@ -72,8 +72,7 @@ def _polar_covariance(line: _Polar, noise: SensorNoise) -> Array:
     n, d = line.numerator, line.denominator
 
     def alpha_by(numerator: Array, denominator: Array) -> Array:
-        derivative: Array = (d * numerator - n * denominator) / (2 * (n * n + d * d))
-        return derivative
+        return (d * numerator - n * denominator) / (2 * (n * n + d * d))
 
     alpha_rho = alpha_by(w * (sine - s2), w * (cosine - c2))
     alpha_theta = alpha_by(wr * (cosine - c2), wr * (s2 - sine))
@@ -81,15 +80,13 @@ def _polar_covariance(line: _Polar, noise: SensorNoise) -> Array:
     r_rho = w * np.cos(theta - line.alpha) / W + lever * alpha_rho
     r_theta = -wr * np.sin(theta - line.alpha) / W + lever * alpha_theta
     g, h = np.stack([alpha_rho, r_rho]), np.stack([alpha_theta, r_theta])
-    covariance: Array = noise.sigma_range**2 * g @ g.T + noise.sigma_bearing**2 * h @ h.T
-    return covariance
+    return noise.sigma_range**2 * g @ g.T + noise.sigma_bearing**2 * h @ h.T
 
 
 def _polar_corner(j: _Polar, k: _Polar) -> Array:
     x = j.r * np.sin(k.alpha) - k.r * np.sin(j.alpha)  # [36]
     y = k.r * np.cos(j.alpha) - j.r * np.cos(k.alpha)  # [37]
-    xy: Array = np.array([x, y]) / np.sin(k.alpha - j.alpha)
-    return xy
+    return np.array([x, y]) / np.sin(k.alpha - j.alpha)
 
 
 def _polar_corner_covariance(j: _Polar, k: _Polar, xy: Array, cj: Array, ck: Array) -> Array:
@@ -98,8 +95,7 @@ def _polar_corner_covariance(j: _Polar, k: _Polar, xy: Array, cj: Array, ck: Arr
     inverse = np.linalg.inv(normals)
     Jj = np.outer(inverse[:, 0], [nj[1] * xy[0] - nj[0] * xy[1], 1])
     Jk = np.outer(inverse[:, 1], [nk[1] * xy[0] - nk[0] * xy[1], 1])
-    covariance: Array = Jj @ cj @ Jj.T + Jk @ ck @ Jk.T
-    return covariance
+    return Jj @ cj @ Jj.T + Jk @ ck @ Jk.T
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,8 +145,7 @@ def _regression_corner_covariance(j: _Regression, k: _Regression, xy: Array, cj:
     inverse = np.linalg.inv(np.array(normals))
     along = xy[j.u] - j.mean, xy[k.u] - k.mean
     variances = np.array([along[0] ** 2 * cj[0] + cj[1], along[1] ** 2 * ck[0] + ck[1]])
-    covariance: Array = inverse * variances @ inverse.T
-    return covariance
+    return inverse * variances @ inverse.T
 
 
 METHODS = {

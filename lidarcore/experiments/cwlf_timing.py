@@ -56,7 +56,10 @@ def uncertainty(
     """Uncertainty of the corner between true walls, seen `draws` times."""
     rng = np.random.default_rng(seed)
     truth, published = corner(METHODS[method], walls, noise)
-    errors = [corner(METHODS[method], _noisy(walls, noise, rng), noise)[0] - truth for _ in range(draws)]
+    errors = []
+    for _ in range(draws):
+        seen = _noisy(walls[0], noise, rng), _noisy(walls[1], noise, rng)
+        errors.append(corner(METHODS[method], seen, noise)[0] - truth)
     lines = [FITTERS["ml"].fit(*wall, noise) for wall in walls]
     (j, k), (first, second) = ((line.alpha, line.r) for line in lines), (wall[1] for wall in walls)
     bound = corner_bound((j, k), (first, second), noise)
@@ -65,15 +68,10 @@ def uncertainty(
     )
 
 
-def _noisy(walls: tuple[Beams, Beams], noise: SensorNoise, rng: np.random.Generator) -> tuple[Beams, Beams]:
-    first, second = (
-        (
-            rho + rng.normal(0, noise.sigma_range, len(rho)),
-            theta + rng.normal(0, noise.sigma_bearing, len(rho)),
-        )
-        for rho, theta in walls
-    )
-    return first, second
+def _noisy(wall: Beams, noise: SensorNoise, rng: np.random.Generator) -> Beams:
+    rho, theta = wall
+    n = len(rho)
+    return rho + rng.normal(0, noise.sigma_range, n), theta + rng.normal(0, noise.sigma_bearing, n)
 
 
 def times(name: str, walls: tuple[Beams, Beams], noise: SensorNoise, repeats: int) -> Times:

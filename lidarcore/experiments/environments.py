@@ -86,9 +86,22 @@ class Environment:
 
 
 def look_around(
-    rooms: Sequence[Room], design: Design, workers: int, done: Callable[[], None]
+    rooms: Sequence[Room],
+    fitters: Sequence[str],
+    design: Design,
+    workers: int,
+    recording: Sequence[Scan] | None,
+    done: Callable[[], None],
 ) -> list[Environment]:
-    """Simulate every room; `done` is called twice for each. Numbers depend on the design only."""
+    """Simulate every room, or take a recording of a sensor at rest in their place.
+
+    `done` is called twice for each room. Numbers depend on the design only. Raises EvaluationError if the recording
+    cannot be used.
+    """
+    if recording is not None:
+        study = recorded(recording, design.settings, fitters)
+        points = recording[0].xy[recording[0].valid]
+        return [Environment("the recording", None, points, study, None)]
     tasks = [(r, segmentation) for r in range(len(rooms)) for segmentation in SEGMENTATIONS]
     studies = run_all(partial(_study, tuple(rooms), design), tasks, workers, done)
     environments = []
@@ -105,12 +118,6 @@ def _study(rooms: Sequence[Room], design: Design, task: tuple[int, Segmentation]
     return simulated(
         rooms[r].place(design.noise), segmentation, design.settings, design.scans, [design.seed, r]
     )
-
-
-def look_at(scans: Sequence[Scan], design: Design, fitters: Sequence[str]) -> list[Environment]:
-    """A recording of a sensor at rest. Raises EvaluationError if it cannot be used."""
-    study = recorded(scans, design.settings, fitters)
-    return [Environment("the recording", None, scans[0].xy[scans[0].valid], study, None)]
 
 
 def of_verdicts(design: Design, simulated_rooms: bool) -> list[str]:

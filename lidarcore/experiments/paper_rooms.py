@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lidarcore.arrays import Array
-from lidarcore.evaluation.repeatability.places import Place, look, shared_ends
+from lidarcore.evaluation.consistency.places import Place, look, shared_ends
 from lidarcore.geometry import left_of
 from lidarcore.noise import SensorNoise
 from lidarcore.simulation.rooms import box, polygon

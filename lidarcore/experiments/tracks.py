@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
@@ -21,20 +21,28 @@ from lidarcore.localization import LocalizationSettings, OdometryNoise, Points
 from lidarcore.localization.ekf.slam import Slam
 from lidarcore.scan import Scan
 from lidarcore.simulation.paths import Path
+from lidarcore.simulation.worlds import Place
 
 START = np.diag([1e-3, 1e-3, 1e-3]) ** 2
 """Covariance of the start pose, which is known: m and rad."""
 
 
-class Perceived(Protocol):
-    """Scans with the true pose (N, 3) and odometry (N, 3) at each."""
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """What the robot of one run perceived on one trajectory, and what there was."""
 
-    @property
-    def scans(self) -> Sequence[Scan]: ...  # noqa: D102
-    @property
-    def truth(self) -> Array: ...  # noqa: D102
-    @property
-    def odometry(self) -> Array: ...  # noqa: D102
+    place: Place
+    scans: Sequence[Scan]
+
+    @cached_property
+    def truth(self) -> Array:
+        """T_world_sensor (N, 3) at each scan."""
+        return np.array([scan.truth for scan in self.scans])
+
+    @cached_property
+    def odometry(self) -> Array:
+        """T_odom_sensor (N, 3) at each scan; the start is the true one."""
+        return np.array([scan.odometry for scan in self.scans])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -62,7 +70,6 @@ class Errors:
     accumulated  m: sum over the scans of the distance in y from the trajectory at the same x, as the paper has it
     rms, largest, final
                  m: distance between estimated and true position, over all scans and at the last one
-    heading      rad: RMS error of the heading
     anees        mean of the normalised squared error of the pose over its dimension: 1 if the covariance is true
     """
 
@@ -70,7 +77,6 @@ class Errors:
     rms: float
     largest: float
     final: float
-    heading: float
     anees: float
 
 
@@ -82,7 +88,7 @@ def measurements(clusters: Clusters) -> Points:
     return Points(clusters.means, clusters.scatters + clusters.covariances, "cluster")
 
 
-def dead_reckoned(drive: Perceived, clusters: Sequence[Clusters], noise: OdometryNoise) -> Track:
+def dead_reckoned(drive: Drive, clusters: Sequence[Clusters], noise: OdometryNoise) -> Track:
     """The track by odometry alone; clusters, rotated into the world, have the covariance of the pose, too [EKF 17]."""
     covariances = [START]
     for before, after in pairwise(drive.odometry):
@@ -111,7 +117,7 @@ def _placed(pose: Array, P: Array, clusters: Clusters) -> tuple[Array, Array]:
     return act(pose, clusters.means), region + G_pose @ P @ G_pose.transpose(0, 2, 1)
 
 
-def filtered(drive: Perceived, clusters: Sequence[Clusters | None], settings: LocalizationSettings) -> Track:
+def filtered(drive: Drive, clusters: Sequence[Clusters | None], settings: LocalizationSettings) -> Track:
     """The track by the SLAM filter on the clusters of each scan; None for a scan in which nothing was seen."""
     slam = Slam(settings, drive.odometry[0], START)
     nothing = Points(np.empty((0, 2)), np.eye(2), "cluster")
@@ -141,7 +147,6 @@ def errors(track: Track, truth: Array, path: Path) -> Errors:
         rms=float(np.sqrt((distance**2).mean())),
         largest=float(distance.max()),
         final=float(distance[-1]),
-        heading=float(np.sqrt((difference[:, 2] ** 2).mean())),
         anees=float(nees.mean() / 3),
     )
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.experiments.environments import Design, Environment, look_around, look_at
+from lidarcore.experiments.environments import Design, Environment, look_around
 from lidarcore.experiments.paper_rooms import WCTLS_ROOMS
 from lidarcore.lines import FITTER_IDS, LINE_FIELDS, fit_beams
 from lidarcore.noise import SensorNoise
@@ -45,11 +45,7 @@ def run(
     All but the times is the same for the same design, whatever the number of workers.
     Raises EvaluationError if the recording cannot be used.
     """
-    environments = (
-        look_around(WCTLS_ROOMS, design, workers, done)
-        if recording is None
-        else look_at(recording, design, FITTERS)
-    )
+    environments = look_around(WCTLS_ROOMS, FITTERS, design, workers, recording, done)
     points = POINTS if recording is None else ()
     times = {(name, n): _time_of_fit(name, design.noise, n) for name in FITTERS for n in points}
     result = WctlsStudy(design, environments, times)

@@ -7,7 +7,6 @@ import numpy as np
 from lidarcore.evaluation.intervals import Interval, ratio
 from lidarcore.experiments.claim_rules import (
     FEW,
-    NOISE_ASSUMED,
     TOLERANCE,
     Claim,
     as_large,
@@ -16,8 +15,8 @@ from lidarcore.experiments.claim_rules import (
     in_words,
     judged,
     median_ratio,
-    nearer,
     not_comparable,
+    on_coverage,
     within,
 )
 from lidarcore.experiments.environments import Environment
@@ -152,12 +151,9 @@ def _of_reliability(environment: Environment, result: WctlsStudy) -> Claim:
         f"Of the corners {in_words(wctls, 100)} % are inside the 95 % ellipse WCTLS publishes, {in_words(utls, 100)} % "
         f"inside that of UTLS.{bound}"
     )
-    if study.bounds is None and result.design.assumed:
-        return claim, f"{measured} {NOISE_ASSUMED}", None
-    return judged(
-        claim, measured, nearer(wctls, utls, 0.95),
-        "Conditional variances leave out most of what range noise does to an oblique wall.",
-    )  # fmt: skip
+    why = "Conditional variances leave out most of what range noise does to an oblique wall."
+    known = study.bounds is not None or not result.design.assumed
+    return on_coverage(claim, measured, known, wctls, utls, why)
 
 
 def _of_gain(environment: Environment) -> Claim:

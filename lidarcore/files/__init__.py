@@ -15,12 +15,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
     Its name is of its own, so that several may write the same file at once; the last one to end stays.
     """
-    partial = path.with_name(f".{path.name}.{os.getpid()}-{next(_NUMBERS)}.part")
-    try:
-        yield partial
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    with replacing_all(path) as (part,):
+        yield part
 
 
 def partials(folder: Path, name: str) -> Iterator[Path]:

@@ -13,8 +13,7 @@ from lidarcore.geometry.se2 import unit_vectors
 def squared_mahalanobis(difference: Array, covariance: Array) -> Array:
     """e^T C^-1 e (...,) of differences (..., n) with covariances (..., n, n)."""
     solved = np.linalg.solve(covariance, difference[..., None])[..., 0]
-    squared: Array = (difference * solved).sum(-1)
-    return squared
+    return (difference * solved).sum(-1)
 
 
 def squared_mahalanobis_2d(u: Numbers, v: Numbers, xx: Numbers, xy: Numbers, yy: Numbers) -> Numbers:
@@ -66,15 +65,13 @@ def ellipse_outline(xy: Array, covariance: Array, sigmas: float, points: int) ->
     half, directions = ellipse_axes(covariance, sigmas)
     turn = np.linspace(0, 2 * np.pi, points)
     circle = unit_vectors(turn)
-    outline: Array = xy[..., None, :] + circle @ np.swapaxes(directions * half[..., None, :], -1, -2)
-    return outline
+    return xy[..., None, :] + circle @ np.swapaxes(directions * half[..., None, :], -1, -2)
 
 
 def largest_variance(covariance: Array) -> Array:
     """Variance (...,) along the longest axis of covariances (..., 2, 2)."""
     xx, xy, yy = covariance[..., 0, 0], covariance[..., 0, 1], covariance[..., 1, 1]
-    largest: Array = (xx + yy) / 2 + np.hypot((xx - yy) / 2, xy)
-    return largest
+    return (xx + yy) / 2 + np.hypot((xx - yy) / 2, xy)
 
 
 def check_covariance(matrices: ArrayLike, name: str) -> None:

@@ -66,8 +66,7 @@ def pose_difference(pose: Array, other: Array) -> Array:
 
 def act(T_a_b: Array, points: Array) -> Array:
     """Points (..., 2) of frame b in frame a: p + R z."""
-    placed: Array = T_a_b[..., :2] + rotate(T_a_b[..., 2], points)
-    return placed
+    return T_a_b[..., :2] + rotate(T_a_b[..., 2], points)
 
 
 def act_inverse(T_a_b: Array, points: Array) -> Array:

@@ -73,5 +73,4 @@ def _own(pose: UncertainPose) -> tuple[Array, Array]:
 
 
 def _carried(J: Array, covariance: Array) -> Array:
-    carried: Array = J @ covariance @ np.swapaxes(J, -1, -2)
-    return carried
+    return J @ covariance @ np.swapaxes(J, -1, -2)

@@ -8,7 +8,7 @@ from lidarcore.landmarks.nearest import Metric, Neighbour
 from lidarcore.landmarks.picture import export_picture
 from lidarcore.landmarks.queries import Box, Circle, Filter, Page
 from lidarcore.landmarks.stored_grid import StoredGrid
-from lidarcore.landmarks.wall import StoredWall
+from lidarcore.landmarks.stored_wall import StoredWall
 
 __all__ = [
     "FORMATS",

@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from lidarcore.closing import Closing
 from lidarcore.errors import UnknownLandmarkError, UnknownSessionError
 from lidarcore.landmarks.database import PATIENCE, Database, path_of
 from lidarcore.landmarks.landmark import Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
 from lidarcore.landmarks.landmark_store import forget_landmarks, store_landmarks
 from lidarcore.landmarks.queries import check_finite
-from lidarcore.landmarks.wall_store import forget_walls
+from lidarcore.landmarks.stored_wall import forget_walls
 
 _SESSIONS = """SELECT id, source, mode, started, ended,
     (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id),
@@ -40,7 +41,7 @@ class Session:
     grid: bool = False
 
 
-class Atlas:
+class Atlas(Closing):
     """Maps of landmarks in one file, made if it is not there: `atlas.newest()`, `atlas[session]`.
 
     Any number of threads and processes may use it, each thread through the same object; reading does not wait for
@@ -53,12 +54,6 @@ class Atlas:
         """Open a path or sqlite:///path; `patience` is for how many seconds to wait while another process writes."""
         self._database = Database(path_of(url), patience)
         self.path = self._database.path
-
-    def __enter__(self) -> "Atlas":
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Close the file; no other call may be under way."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from threading import Lock
 
 from lidarcore.errors import LandmarkError, LandmarkMapError
-from lidarcore.foreign_database import MOST_BYTES
+from lidarcore.files.foreign_database import MOST_BYTES
 from lidarcore.landmarks.schema import APPLICATION, UNIT, VERSION, expected_schema, migrate, schema_of
 
 PATIENCE = 10.0  # s to wait while another process writes

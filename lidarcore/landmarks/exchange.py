@@ -10,6 +10,7 @@ import reprlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -17,6 +18,7 @@ from lidarcore.errors import LandmarkError, MapFileError
 from lidarcore.files import replacing
 from lidarcore.files.json_reader import JsonReader
 from lidarcore.files.streams import MAX_LINE
+from lidarcore.files.texts import json_lines
 from lidarcore.landmarks.landmark import COLUMNS, Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
 
@@ -116,15 +118,11 @@ def _lines(file: TextIO) -> Iterator[str]:
 
 
 def _write_json(rows: Iterable[Row], file: TextIO) -> None:
-    _write_document(_HEADER, "landmarks", rows, file)
-
-
-def _read_json(file: TextIO) -> Iterator[Row]:
-    return _items(file, "landmarks")
+    file.writelines(json_lines(_HEADER, "landmarks", rows))
 
 
 def _write_geojson(rows: Iterable[Row], file: TextIO) -> None:
-    _write_document({"type": "FeatureCollection"} | _HEADER, "features", map(_feature, rows), file)
+    file.writelines(json_lines({"type": "FeatureCollection"} | _HEADER, "features", map(_feature, rows)))
 
 
 def _read_geojson(file: TextIO) -> Iterator[Row]:
@@ -147,16 +145,6 @@ def _feature(row: Row) -> Row:
     properties = {name: value for name, value in row.items() if name not in ("id", "x", "y")}
     point = {"type": "Point", "coordinates": [row["x"], row["y"]]}
     return {"type": "Feature", "id": row["id"], "geometry": point, "properties": properties}
-
-
-def _write_document(head: Row, key: str, items: Iterable[Row], file: TextIO) -> None:
-    """A JSON object with one item a line, written as they come."""
-    file.write(f"{json.dumps(head)[:-1]}, {json.dumps(key)}: [")
-    separator = "\n"
-    for item in items:
-        file.write(separator + json.dumps(item, allow_nan=False))
-        separator = ",\n"
-    file.write("\n]}\n")
 
 
 def _items(file: TextIO, key: str) -> Iterator[Row]:
@@ -215,7 +203,7 @@ class Format:
 
 
 FORMATS = {
-    "json": Format(_write_json, _read_json),
+    "json": Format(_write_json, partial(_items, key="landmarks")),
     "csv": Format(_write_csv, _read_csv),
     "geojson": Format(_write_geojson, _read_geojson),
 }

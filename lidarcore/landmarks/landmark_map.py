@@ -30,8 +30,7 @@ from lidarcore.landmarks.queries import (
     find,
 )
 from lidarcore.landmarks.stored_grid import StoredGrid, grid_of, replace_grid
-from lidarcore.landmarks.wall import StoredWall
-from lidarcore.landmarks.wall_store import replace_walls, wall_history, walls_of
+from lidarcore.landmarks.stored_wall import StoredWall, replace_walls, wall_history, walls_of
 
 _ALL = Filter()
 _IN_SESSION = f"SELECT {SELECTED} FROM landmarks WHERE session = :session"

@@ -66,11 +66,9 @@ class Neighbourhood:
         """The k nearest, at most `within` away, nearest first."""
         if self._are_few():
             return self._nearest_of_all(k, within, metric)
-        return self._euclidean(k, within) if metric == "euclidean" else self._mahalanobis(k, within)
-
-    def _euclidean(self, k: int, within: float) -> list[Neighbour]:
-        """The k nearest, at most `within` m away."""
-        return self._nearest("euclidean", k, within, self._reach(k, within), 0.0)
+        if metric == "euclidean":
+            return self._nearest(metric, k, within, self._reach(k, within), 0.0)
+        return self._mahalanobis(k, within)
 
     def _mahalanobis(self, k: int, within: float) -> list[Neighbour]:
         """The k nearest by sqrt(d^T (C + R)^-1 d), C of the landmark, R of the point, at most `within` away.

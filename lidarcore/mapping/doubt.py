@@ -12,8 +12,7 @@ DOUBTFUL = chi_square_gate(0.99, 3)
 
 def trust(chi2: Numbers, doubtful: float) -> Numbers:
     """Weights (...,) of what disagrees by chi2 (...,), 1 up to where it becomes doubtful [(15)]; kernels compile it."""
-    weights: Numbers = np.minimum(1.0, 2 / (1 + chi2 / doubtful)) ** 2
-    return weights
+    return np.minimum(1.0, 2 / (1 + chi2 / doubtful)) ** 2
 
 
 compiled_trust = inlined(trust)

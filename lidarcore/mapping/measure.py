@@ -15,9 +15,10 @@ from lidarcore.errors import MeasureError
 from lidarcore.mapping.walls import Walls
 
 Kind = Literal["wall", "corner"]
-_Function = Callable[[Array, Array], float]
+PointsFunction = Callable[[Array, Array], float]
+"""Of the points (1, 2) of a corner or (2, 2) of a wall, twice."""
 
-_STEP = 1e-6  # m, of numeric derivatives by the coordinates of points
+_STEP = 1e-6  # m and rad, of numeric derivatives
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +58,6 @@ def distance(walls: Walls, first: Feature, second: Feature) -> Measurement:
 
 def angle(walls: Walls, first: Feature, second: Feature) -> Measurement:
     """Between the lines of two walls, from 0 to pi/2. Raises MeasureError if one of them is a corner or unknown."""
-    if first.kind != "wall" or second.kind != "wall":
-        raise MeasureError("Only walls have a direction: give two walls to measure an angle.")
     return _measured(walls, first, second, angle_of)
 
 
@@ -68,22 +67,30 @@ def length(walls: Walls, id: int) -> Measurement:
     return Measurement(float(walls.length[index]), float(np.sqrt(walls.length_variance[index])))
 
 
-def _measured(walls: Walls, first: Feature, second: Feature, f: _Function) -> Measurement:
+def check(f: PointsFunction, first: Feature, second: Feature) -> None:
+    """Raise MeasureError if two features have no such distance or angle."""
+    if f is angle_of and "corner" in (first.kind, second.kind):
+        raise MeasureError("Only walls have a direction: give two walls to measure an angle.")
     if first == second:
         raise MeasureError("Both features are the same: give two different ones.")
-    points = np.concatenate([_points(walls, one) for one in (first, second)])
-    split = len(_points(walls, first))
+
+
+def propagated(f: Callable[[Array], float], at: Array, covariance: Array) -> Measurement:
+    """The size of f at numbers (...) whose covariance (N, N) is given, to first order, by numeric derivatives."""
+    steps = _STEP * np.eye(at.size).reshape(-1, *at.shape)
+    J = np.array([f(at + step) - f(at - step) for step in steps]) / (2 * _STEP)
+    return Measurement(abs(f(at)), float(np.sqrt(max(float(J @ covariance @ J), 0.0))))
+
+
+def _measured(walls: Walls, first: Feature, second: Feature, f: PointsFunction) -> Measurement:
+    check(f, first, second)
+    a, b = (_points(walls, one) for one in (first, second))
     rows = csr_array(vstack([_rows(walls, one) for one in (first, second)]))
-    covariance: Array = walls.model.covariance(rows)
-    value = f(points[:split], points[split:])
-    J = np.empty(points.size)
-    for k in range(points.size):
-        moved = points.copy()
-        moved.flat[k] += _STEP
-        ahead = f(moved[:split], moved[split:])
-        moved.flat[k] -= 2 * _STEP
-        J[k] = (ahead - f(moved[:split], moved[split:])) / (2 * _STEP)
-    return Measurement(abs(value), float(np.sqrt(max(float(J @ covariance @ J), 0.0))))
+    return propagated(
+        lambda points: f(points[: len(a)], points[len(a) :]),
+        np.concatenate([a, b]),
+        walls.model.covariance(rows),
+    )
 
 
 def _place(walls: Walls, one: Feature) -> int:
@@ -100,8 +107,7 @@ def _place(walls: Walls, one: Feature) -> int:
 def _points(walls: Walls, one: Feature) -> Array:
     """Both ends of a wall, or the corner itself: (2, 2) or (1, 2) m. Raises MeasureError."""
     at = _place(walls, one)
-    points: Array = walls.ends[at] if one.kind == "wall" else walls.corners.xy[at][None]
-    return points
+    return walls.ends[at] if one.kind == "wall" else walls.corners.xy[at][None]
 
 
 def _rows(walls: Walls, one: Feature) -> csr_array:

@@ -7,16 +7,21 @@ All that is measured is a function of the lines of the walls, so a wall that bot
 from collections.abc import Callable
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MeasureError
 from lidarcore.features import Features
 from lidarcore.geometry import left_of, unit_vectors
-from lidarcore.mapping.measure import Feature, Measurement, angle_of, distance_of
-
-_Points = Callable[[Array], Array]  # of a feature, by the lines (L, 2) of all walls
-
-_STEP = 1e-6  # rad and m, of numeric derivatives
+from lidarcore.mapping.measure import (
+    Feature,
+    Measurement,
+    PointsFunction,
+    angle_of,
+    check,
+    distance_of,
+    propagated,
+)
 
 
 def distance(features: Features, first: Feature, second: Feature) -> Measurement:
@@ -26,33 +31,21 @@ def distance(features: Features, first: Feature, second: Feature) -> Measurement
 
 def angle(features: Features, first: Feature, second: Feature) -> Measurement:
     """Between the lines of two walls, 0 to pi/2. Raises MeasureError if one of them is a corner or unknown."""
-    if first.kind != "wall" or second.kind != "wall":
-        raise MeasureError("Only walls have a direction: give two walls to measure an angle.")
     return _measured(features, first, second, angle_of)
 
 
-def _measured(
-    features: Features, first: Feature, second: Feature, f: Callable[[Array, Array], float]
-) -> Measurement:
-    if first == second:
-        raise MeasureError("Both features are the same: give two different ones.")
+def _measured(features: Features, first: Feature, second: Feature, f: PointsFunction) -> Measurement:
+    check(f, first, second)
     lines = np.stack([features.lines.alpha, features.lines.r], 1)
     a, b = (_points_of(features, one) for one in (first, second))
+    walls = sorted({*_walls_of(features, first), *_walls_of(features, second)})
 
     def value(at: Array) -> float:
-        return f(a(at), b(at))
+        moved = lines.copy()
+        moved[walls] = at
+        return f(a(moved), b(moved))
 
-    variance = 0.0
-    for wall in {*_walls_of(features, first), *_walls_of(features, second)}:
-        J = np.array([_slope(value, lines, wall, k) for k in range(2)])
-        variance += float(J @ features.lines.covariance[wall] @ J)
-    return Measurement(abs(value(lines)), float(np.sqrt(max(variance, 0.0))))
-
-
-def _slope(f: Callable[[Array], float], lines: Array, wall: int, k: int) -> float:
-    step = np.zeros_like(lines)
-    step[wall, k] = _STEP
-    return (f(lines + step) - f(lines - step)) / (2 * _STEP)
+    return propagated(value, lines[walls], block_diag(*features.lines.covariance[walls]))
 
 
 def _walls_of(features: Features, one: Feature) -> list[int]:
@@ -63,25 +56,25 @@ def _walls_of(features: Features, one: Feature) -> list[int]:
     return [one.index] if one.kind == "wall" else [int(i) for i in features.corners.segments[one.index]]
 
 
-def _points_of(features: Features, one: Feature) -> _Points:
-    """Both ends of a wall, which stay where they are along it, or the corner itself: (2, 2) or (1, 2) m."""
+def _points_of(features: Features, one: Feature) -> Callable[[Array], Array]:
+    """Both ends of a wall, which stay where they are along it, or the corner itself, by the lines (L, 2) of all walls.
+
+    (2, 2) or (1, 2) m.
+    """
     walls = _walls_of(features, one)
     if one.kind == "corner":
         return lambda lines: _meeting(lines[walls])
     (wall,) = walls
     ends = np.stack([features.segments.start[wall], features.segments.end[wall]])
-    alpha = features.lines.alpha[wall]
-    along = ends @ left_of(unit_vectors(alpha))
+    along = ends @ left_of(unit_vectors(features.lines.alpha[wall]))
 
     def points(lines: Array) -> Array:
         normal = unit_vectors(lines[wall, 0])
-        placed: Array = lines[wall, 1] * normal + along[:, None] * left_of(normal)
-        return placed
+        return lines[wall, 1] * normal + along[:, None] * left_of(normal)
 
     return points
 
 
 def _meeting(lines: Array) -> Array:
     """Where two lines (2, 2) meet: (1, 2) m."""
-    place = np.asarray(np.linalg.solve(unit_vectors(lines[:, 0]), lines[:, 1]), np.float64)
-    return place[None]
+    return np.asarray(np.linalg.solve(unit_vectors(lines[:, 0]), lines[:, 1]), np.float64)[None]

@@ -1,23 +1,19 @@
 """What a user can set about scan matching and the map made of it: declared once, with unit, range and meaning."""
 
 from dataclasses import field, replace
-from typing import Annotated
 
 import numpy as np
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
 
 from lidarcore.arrays import Array
-from lidarcore.fields import number
+from lidarcore.fields import number, settings, whole
 from lidarcore.localization.settings import OdometryNoise
 from lidarcore.noise import SensorNoise
 
 VAGUE = 0.5
 """rad: where a heading is known no better than this, what a sensor should see cannot be told."""
-_CONFIG = ConfigDict(extra="forbid")
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class MatchSettings:
     """How two scans are matched to each other. Immutable; pydantic.ValidationError names a wrong field."""
 
@@ -44,7 +40,7 @@ class MatchSettings:
     max_turn: float = number(0, 3.15, "rad", "the coarse match never turns by more than this", default=3.15)
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class FrontSettings:
     """How a scan is matched to the local map, and which scans make it."""
 
@@ -68,7 +64,7 @@ class FrontSettings:
         0, 10, "m", "a scan this far from the last keyframe is one", default=0.3
     )
     keyframe_turn: float = number(0, 3.15, "rad", "a scan turned this much is a keyframe", default=0.26)
-    keyframes: Annotated[int, Field(ge=1, le=100, description="last keyframes that make the local map")] = 10
+    keyframes: int = whole(1, 100, "last keyframes that make the local map", default=10)
     inliers: float = number(
         0.05, 1, "", "share of a scan that must lie on the local map to be tied to it", default=0.15
     )
@@ -81,7 +77,7 @@ class FrontSettings:
     )
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class LoopSettings:
     """When a scan is tied to an earlier place."""
 
@@ -90,13 +86,9 @@ class LoopSettings:
         0, 10, "", "standard deviations by which places may be farther, and stretches longer", default=2.5
     )
     farthest: float = number(1, 100, "m", "no earlier place is farther than this", default=20.0)
-    apart: Annotated[int, Field(ge=1, le=1000, description="keyframes between two that make a loop")] = 10
-    before: Annotated[
-        int, Field(ge=0, le=20, description="keyframes before one that are matched with it")
-    ] = 4
-    places: Annotated[
-        int, Field(ge=1, le=50, description="passes that one scan is matched with, at most")
-    ] = 4
+    apart: int = whole(1, 1000, "keyframes between two that make a loop", default=10)
+    before: int = whole(0, 20, "keyframes before one that are matched with it", default=4)
+    places: int = whole(1, 50, "passes that one scan is matched with, at most", default=4)
     overlap: float = number(
         0.1, 1, "", "share of the scan that the earlier one should have seen", default=0.4
     )
@@ -109,10 +101,9 @@ class LoopSettings:
     )
     floor_distance: float = number(1e-4, 1, "m", "no loop is known better than this", default=0.01)
     floor_turn: float = number(1e-5, 1, "rad", "no loop is known better than this", default=0.003)
-    support: Annotated[
-        int,
-        Field(ge=2, le=20, description="nodes with loops that agree where the map is too vague to judge one"),
-    ] = 3
+    support: int = whole(
+        2, 20, "nodes with loops that agree where the map is too vague to judge one", default=3
+    )
     shortest: float = number(0, 100, "m", "way along which such loops agree, at least", default=3.0)
     longest: float = number(0, 100, "m", "way that is enough however vague the map is", default=12.0)
     rivals: float = number(
@@ -131,7 +122,7 @@ class LoopSettings:
         return self.shortest, self.longest
 
 
-@dataclass(config=_CONFIG, frozen=True, slots=True, kw_only=True)
+@settings
 class MapperSettings:
     """How scans become a map."""
 

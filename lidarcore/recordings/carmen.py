@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lidarcore.geometry import PoseTrack, compose
+from lidarcore.geometry import PoseTrack
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
 from lidarcore.recordings.laser_survey import SICK_RANGE, Survey
 from lidarcore.scan import Array, Scan
@@ -65,13 +65,10 @@ class CarmenLog(LaserLog):
                 "The log does not say where the laser sits: taken at the robot's centre, facing forward."
             )
 
-    def _odometry(self, reading: Reading, stamp: float) -> Array | None:
-        base_pose = reading.base_pose
-        if base_pose is None and self._track is not None:
-            base_pose = self._track.at(stamp)
-        if base_pose is None or self.T_base_sensor is None:
-            return base_pose
-        return compose(base_pose, self.T_base_sensor)
+    def _base_pose(self, reading: Reading, stamp: float) -> Array | None:
+        if reading.base_pose is None and self._track is not None:
+            return self._track.at(stamp)
+        return reading.base_pose
 
     def _scan(self, reading: Reading, stamp: float) -> Scan:
         scan = super()._scan(reading, stamp)

@@ -9,6 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from lidarcore.files.streams import lines
+from lidarcore.geometry import compose
 from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
 from lidarcore.recordings.laser_survey import SICK_RANGE, Survey
 from lidarcore.scan import Array, Scan
@@ -140,5 +141,12 @@ class LaserLog(Recording):
         return Scan(ranges, bearings, stamp, reading.quality, odometry=odometry, truth=reading.truth)
 
     def _odometry(self, reading: Reading, stamp: float) -> Array | None:
-        """T_odom_sensor (3,) of a reading."""
+        """T_odom_sensor (3,) of a reading: as it says, or by where the robot was and the sensor sits on it."""
+        base_pose = self._base_pose(reading, stamp)
+        if base_pose is None or self.T_base_sensor is None:
+            return base_pose
+        return compose(base_pose, self.T_base_sensor)
+
+    def _base_pose(self, reading: Reading, stamp: float) -> Array | None:
+        """T_odom_base (3,) of a reading; that of the sensor where the log knows no robot."""
         return reading.pose

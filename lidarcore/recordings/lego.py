@@ -12,7 +12,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.files.streams import lines, open_stream
-from lidarcore.geometry import PoseTrack, compose
+from lidarcore.geometry import PoseTrack
 from lidarcore.recordings.encoders import dead_reckoning
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
 from lidarcore.recordings.laser_survey import Survey
@@ -87,8 +87,7 @@ class LegoLog(LaserLog):
         scan, place = super()._scan(reading, stamp), self._reference.at(stamp)
         return scan if place is None else replace(scan, truth=np.array([*place[:2] / 1000, np.nan]))
 
-    def _odometry(self, reading: Reading, stamp: float) -> Array | None:
+    def _base_pose(self, reading: Reading, stamp: float) -> Array | None:
         if not self._track or not self._first - _BESIDE <= stamp <= self._last + _BESIDE:
             return None
-        base_pose = self._track.at(min(max(stamp, self._first), self._last))
-        return None if base_pose is None else compose(base_pose, np.array([_AHEAD, 0.0, 0.0]))
+        return self._track.at(min(max(stamp, self._first), self._last))

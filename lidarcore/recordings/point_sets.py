@@ -1,24 +1,21 @@
 """JSON files of point sets, one for each of several sensors: {"name": [[x, y], ...], ...}."""
 
-import json
+import math
 import re
-from collections import defaultdict
+from array import array
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import IO
+from io import TextIOWrapper
 
 import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import RecordingError
+from lidarcore.files.json_reader import JsonReader
 from lidarcore.recordings.base import Recording
 from lidarcore.scan import Scan
 
-PIECE = 1 << 16  # bytes that are taken apart at a time
 MOST_SETS = 1000
-_NAME = re.compile(rb'\s*[{,]\s*("(?:[^"\\]|\\.)*")\s*:\s*\[')
-_LIST_END = re.compile(rb"(?:(?<=\])|\A)\s*\]")  # after the last point, or at once if all were read
-_END = re.compile(rb"\s*\}\s*\Z")
 
 
 class PointSets(Recording):
@@ -28,47 +25,33 @@ class PointSets(Recording):
     signature = re.compile(rb'\A\s*\{\s*"[^"]*"\s*:\s*\[\s*\[\s*[-\d]')
 
     def _open(self, topic: str | None) -> None:
-        sets: defaultdict[str, list[Array]] = defaultdict(list)
+        sets: dict[str, Array] = {}
         with self._stream() as stream:
-            for name, points in _pieces(stream):
-                if points.ndim != 2 or points.shape[1] != 2 or not np.isfinite(points).all():
-                    raise RecordingError(f"{name} in {self.path.name} is not a list of points [x, y] in m.")
-                sets[name].append(points)
-                self._check_beams(sum(map(len, sets[name])))
+            reader = JsonReader(TextIOWrapper(stream, "utf-8"))
+            for name in reader.members():
+                sets[name] = self._points(name, reader)
                 if len(sets) > MOST_SETS:
                     raise self._error(f"holds more than {MOST_SETS} point sets: give some of them.")
+            if reader.next():
+                raise ValueError("there is more text after the end of the object")
         self._choose(sets, topic)
-        self._points = np.concatenate(sets[str(self.topic)])
+        self._chosen = sets[str(self.topic)]
         self._remark("Beams without a return are not in the file.")
 
+    def _points(self, name: str, reader: JsonReader) -> Array:
+        """The points (N, 2) of one sensor, not as Python's objects, which take twenty times as much as the file."""
+        flat = array("d")
+        for point in reader.items():
+            match point:
+                case [int() | float() as x, int() | float() as y] if math.isfinite(x) and math.isfinite(y):
+                    flat.extend((x, y))
+                case _:
+                    raise RecordingError(f"{name} in {self.path.name} is not a list of points [x, y] in m.")
+            self._check_beams(len(flat) // 2)
+        return np.array(flat).reshape(-1, 2)
+
     def _scans(self) -> Iterator[Callable[[], Scan]]:
-        yield partial(_scan, self._points)
-
-
-def _pieces(stream: IO[bytes]) -> Iterator[tuple[str, Array]]:
-    """Names and some of their points (N, 2): in one piece, a file takes twenty times its size as Python's objects.
-
-    Raises ValueError or EOFError if the file is not of that form.
-    """
-    text = stream.read(PIECE)
-    while head := _NAME.match(text):
-        name, text, is_empty = json.loads(head[1]), text[head.end() :], True
-        end = None
-        while end is None:
-            end = _LIST_END.search(text)
-            cut = end.start() if end else text.rfind(b"]") + 1
-            if end is None and not cut:
-                raise EOFError(f"the points of {name} do not end")
-            if is_empty or text[:cut].strip():
-                yield name, np.array(json.loads(b"[" + text[:cut].strip(b", \r\n\t") + b"]"), np.float64)
-            is_empty = False
-            text = text[end.end() if end else cut :]
-            more = stream.read(PIECE) if len(text) < PIECE else b""
-            if not (end or more):
-                raise EOFError(f"the points of {name} do not end")
-            text += more
-    if not _END.match(text):
-        raise ValueError(f"there is {text[:40]!r} where a name or the end should be")
+        yield partial(_scan, self._chosen)
 
 
 def _scan(points: Array) -> Scan:

@@ -17,15 +17,10 @@ WHOLE = 0.75
 
 
 class Revolution(NamedTuple):
-    """Samples (angle deg clockwise, distance mm, and quality if there is one), and the station they are from."""
+    """Samples (N, 2 or 3): angle deg clockwise, distance mm, and quality if there is one; the station they are from."""
 
-    samples: list[tuple[float, ...]]
-    station: float = 0.0
-
-
-class _Checked(NamedTuple):
     samples: Array
-    station: float
+    station: float = 0.0
 
 
 class RplidarRecording(Recording):
@@ -48,15 +43,15 @@ class RplidarRecording(Recording):
                 self._stations.append(index)
             yield partial(_scan, revolution.samples, NOMINAL_PERIOD * index)
 
-    def _checked(self, revolution: Revolution) -> _Checked:
-        """Samples (N, 2 or 3) whose angle is one."""
-        self._check_beams(len(revolution.samples))
-        samples = np.array(revolution.samples)
+    def _checked(self, revolution: Revolution) -> Revolution:
+        """The samples whose angle is one."""
+        samples = revolution.samples
+        self._check_beams(len(samples))
         sound = (samples[:, 0] >= 0) & (samples[:, 0] <= 360)
         self._count("samples with an angle outside 0..360 degrees left out", int(np.sum(~sound)))
-        return _Checked(samples[sound], revolution.station)
+        return revolution._replace(samples=samples[sound])
 
-    def _whole(self, revolutions: Iterable[_Checked]) -> Iterator[_Checked]:
+    def _whole(self, revolutions: Iterable[Revolution]) -> Iterator[Revolution]:
         """Leave out the first and the last revolution if they are partial."""
         before, current = None, None
         for after in chain(revolutions, [None]):

@@ -4,6 +4,8 @@ import re
 from collections.abc import Iterator
 from itertools import groupby, islice
 
+import numpy as np
+
 from lidarcore.files.streams import lines
 from lidarcore.recordings.base import MOST_BEAMS
 from lidarcore.recordings.revolutions import Revolution, RplidarRecording
@@ -23,7 +25,7 @@ class RplidarCsv(RplidarRecording):
     def _revolutions(self) -> Iterator[Revolution]:
         for key, samples in groupby(self._samples(), key=lambda keyed: keyed[0]):
             sweep = [sample for _, sample in islice(samples, MOST_BEAMS + 1)]
-            yield Revolution(sweep, station=key[0] if len(key) > 1 else 0.0)
+            yield Revolution(np.array(sweep), station=key[0] if len(key) > 1 else 0.0)
 
     def _samples(self) -> Iterator[tuple[Values, Values]]:
         """Yield what tells one revolution from the next, and the sample."""

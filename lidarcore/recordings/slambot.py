@@ -9,7 +9,7 @@ from array import array
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import PoseTrack, compose
+from lidarcore.geometry import PoseTrack
 from lidarcore.recordings.encoders import dead_reckoning, unwrapped
 from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
 from lidarcore.recordings.laser_survey import Survey
@@ -62,6 +62,5 @@ class SlambotLog(LaserLog):
         bearings = -np.deg2rad(np.arange(_DEGREES, dtype=np.float64))
         return Reading("scans", np.array(ranges) / 1000, bearings, np.inf, (milliseconds,))
 
-    def _odometry(self, reading: Reading, stamp: float) -> Array | None:
-        base_pose = self._track.at(stamp) if self._track else None
-        return None if base_pose is None else compose(base_pose, np.array([_AHEAD, 0.0, 0.0]))
+    def _base_pose(self, reading: Reading, stamp: float) -> Array | None:
+        return self._track.at(stamp) if self._track else None

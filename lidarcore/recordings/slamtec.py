@@ -3,6 +3,8 @@
 import re
 from collections.abc import Iterator
 
+import numpy as np
+
 from lidarcore.files.streams import lines
 from lidarcore.recordings.base import MOST_BEAMS
 from lidarcore.recordings.revolutions import Revolution, RplidarRecording
@@ -31,11 +33,11 @@ class SlamtecDump(RplidarRecording):
         samples: list[tuple[float, ...]] = []
         for sample in self._samples():
             if samples and (sample[0] < samples[-1][0] - STEP_BACK or len(samples) > MOST_BEAMS):
-                yield Revolution(samples)
+                yield Revolution(np.array(samples))
                 samples = []
             samples.append(sample)
         if samples:
-            yield Revolution(samples)
+            yield Revolution(np.array(samples))
 
     def _samples(self) -> Iterator[tuple[float, ...]]:
         announced = found = 0

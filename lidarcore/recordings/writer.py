@@ -5,10 +5,10 @@ import time
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from lidarcore.body_mask import Sector, as_text
+from lidarcore.closing import Closing
 from lidarcore.features import Features
 from lidarcore.files.growing_file import GrowingFile
 from lidarcore.recordings.base import NOMINAL_PERIOD
@@ -28,7 +28,7 @@ END = struct.pack("<BQI BQQQI", 15, 4, 0, 2, 20, 0, 0, 0) + MAGIC
 """of an MCAP file without an index (DataEnd, Footer): makes it whole after every flush, for any reader."""
 
 
-class RecordingWriter:
+class RecordingWriter(Closing):
     """A recording that grows scan by scan: `with RecordingWriter("room.mcap") as recording: recording.write(scan)`.
 
     Topics, all in the frame "laser" and with the stamp of the scan:
@@ -104,14 +104,6 @@ class RecordingWriter:
                 self._file.complete()
         finally:
             self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _keep(self, mask: tuple[Sector, ...]) -> None:
         if mask != self._mask:

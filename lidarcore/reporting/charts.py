@@ -107,7 +107,8 @@ def chart(map_: Map, width: int = WIDTH) -> str:
     if len(map_.view):
         parts.append(f'<path class="view" d="{_path(at(map_.view))}Z"/>')
     for style, centres, covariances in map_.ellipses:
-        outlines = [_path(at(outline)) + "Z" for outline in _outlines(centres, covariances)]
+        around = ellipse_outline(centres, covariances, SIGMAS_95, 25)
+        outlines = [_path(at(outline)) + "Z" for outline in around]
         parts.append(f'<path class="ellipse {style}" d="{"".join(outlines)}"/>')
     parts += [
         f'<circle class="post" cx="{x:.1f}" cy="{y:.1f}" r="{map_.radius * scale:.1f}"/>'
@@ -115,16 +116,8 @@ def chart(map_: Map, width: int = WIDTH) -> str:
     ]
     parts += [f'<path class="dots {style}" d="{_dots(at(xy))}"/>' for style, xy in map_.points]
     parts += [f'<path class="line {style}" d="{_path(at(xy))}"/>' for style, xy in map_.lines if len(xy) > 1]
-    parts += [
-        f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="middle">{escape(text)}</text>'
-        for text, (x, y) in zip(map_.texts, at(map_.texts_at), strict=True)
-    ]
+    parts += [label(x, y, text) for text, (x, y) in zip(map_.texts, at(map_.texts_at), strict=True)]
     return svg(width, (y1 - y0) * scale, "".join(parts), map_.title)
-
-
-def _outlines(centres: Array, covariances: Array) -> Array:
-    """Points (L, 25, 2) around the ellipses that hold 95 %."""
-    return ellipse_outline(centres, covariances, SIGMAS_95, 25)
 
 
 def _grid(box: tuple[float, float, float, float], scale: float) -> str:
@@ -148,6 +141,11 @@ def _path(xy: Array) -> str:
 def _dots(xy: Array) -> str:
     """A line of no length for each: round caps make dots of them."""
     return "".join(f"M{x:.1f} {y:.1f}h0" for x, y in xy)
+
+
+def label(x: float, y: float, text: str) -> str:
+    """A text whose middle is there."""
+    return f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="middle">{escape(text)}</text>'
 
 
 def svg(width: float, height: float, content: str, title: str, style: str = "drawing") -> str:

@@ -6,7 +6,7 @@ from html import escape
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.reporting.charts import WIDTH, svg
+from lidarcore.reporting.charts import WIDTH, label, svg
 
 _LEFT, _BOTTOM, _TOP, _HEIGHT = 52, 34, 8, 240
 _BOX = 26  # width of a box
@@ -25,9 +25,9 @@ def curves(
     right = 0.0
     for value in x:
         if at(value) > right:
-            parts.append(_label(at(value), _HEIGHT - 18, f"{value:g}"))
+            parts.append(label(at(value), _HEIGHT - 18, f"{value:g}"))
             right = at(value) + _APART
-    parts.append(_label((_LEFT + WIDTH) / 2, _HEIGHT - 3, labels[0]))
+    parts.append(label((_LEFT + WIDTH) / 2, _HEIGHT - 3, labels[0]))
     for style, values in series:
         points = "L".join(f"{at(a):.1f} {y(b):.1f}" for a, b in zip(x, values, strict=True))
         parts.append(f'<path class="line {style}" d="M{points}"/>')
@@ -53,7 +53,7 @@ def boxes(
         x = _LEFT + (k + 0.5) * step
         parts.append(_box(values, x, y, style))
         for n, line in enumerate(name.split("\n")):
-            parts.append(_label(x, _HEIGHT - 18 + 13 * n, line))
+            parts.append(label(x, _HEIGHT - 18 + 13 * n, line))
     for k, value in marks:
         x = _LEFT + (k + 0.5) * step
         parts.append(f'<path class="reference" d="M{x - _BOX:.1f} {y(value):.1f}h{2 * _BOX}"/>')
@@ -77,7 +77,7 @@ def _box(values: Array, x: float, y: Callable[[float], float], style: str) -> st
     )
 
 
-def _log_axis(low: float, high: float, label: str) -> tuple[Callable[[float], float], str]:
+def _log_axis(low: float, high: float, unit: str) -> tuple[Callable[[float], float], str]:
     """Where a value is, and a grid with numbers at 1, 2 and 5 times powers of ten."""
     low, high = low / 1.3, high * 1.3
     y = _scale(low, high, _HEIGHT - _BOTTOM, _TOP)
@@ -91,13 +91,9 @@ def _log_axis(low: float, high: float, label: str) -> tuple[Callable[[float], fl
     )
     return (
         y,
-        f'<path class="grid" d="{grid}"/>{numbers}<text class="tick" x="0" y="{_TOP + 4}">{escape(label)}</text>',
+        f'<path class="grid" d="{grid}"/>{numbers}<text class="tick" x="0" y="{_TOP + 4}">{escape(unit)}</text>',
     )
 
 
 def _scale(low: float, high: float, first: float, last: float) -> Callable[[float], float]:
     return lambda value: first + (last - first) * float(np.log(value / low) / np.log(high / low))
-
-
-def _label(x: float, y: float, text: str) -> str:
-    return f'<text class="tick" x="{x:.1f}" y="{y:.1f}" text-anchor="middle">{escape(text)}</text>'

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from os import PathLike
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Literal, Self
+from typing import IO, Any, Literal
 
+from lidarcore.closing import Closing
 from lidarcore.errors import RecordingError
 from lidarcore.files.growing_file import GrowingFile
 from lidarcore.files.streams import MAX_LINE, take
@@ -42,7 +42,7 @@ class Stream:
     baud: int = 256000
 
 
-class CaptureWriter:
+class CaptureWriter(Closing):
     """Writes a capture; its `write` is made to be the tap of a Driver.
 
     stream  what is streaming already when the capture begins
@@ -67,14 +67,6 @@ class CaptureWriter:
     def close(self) -> None:
         """Close the file; one without a record is removed."""
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def read_stream(file: IO[bytes]) -> Stream:

@@ -12,6 +12,7 @@ from typing import Literal, Self
 
 from serial.tools.list_ports import comports
 
+from lidarcore.closing import Closing
 from lidarcore.errors import DeviceError, NoAnswerError
 from lidarcore.rplidar.connection.devices import find_other_baud, only_device
 from lidarcore.rplidar.connection.exit_handlers import close_at_exit, forget_at_exit
@@ -34,7 +35,7 @@ KEPT = 10  # revolutions
 CLOSING = 3.0  # s
 
 
-class Driver:
+class Driver(Closing):
     """An RPLIDAR at a serial port.
 
         with Driver() as driver:
@@ -97,9 +98,6 @@ class Driver:
             raise
         self._thread.start()
         return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Stop the motor, let go of the port and end the iterators; from any thread, also more than once.

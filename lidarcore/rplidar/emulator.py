@@ -7,6 +7,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -42,9 +43,9 @@ class Emulator:
                 "unplug": self._unplug,
                 "replug": self._replug,
                 "stall": self._stall,
-                "flip": self._flip,
-                "lose": self._lose,
-                "lose-bytes": self._lose_bytes,
+                "flip": partial(self._worsen, "flip"),
+                "lose": partial(self._worsen, "lose"),
+                "lose-bytes": partial(self._worsen, "lose_bytes"),
                 "garbage": self._garbage,
                 "health": self._health,
                 "quit": self.quit,
@@ -113,14 +114,10 @@ class Emulator:
         """No measurements for so long, as when the motor is held."""
         self._stalled_until = time.monotonic() + seconds
 
-    def _flip(self, share: float) -> None:
-        self._faults.flip = _share(share)
-
-    def _lose(self, share: float) -> None:
-        self._faults.lose = _share(share)
-
-    def _lose_bytes(self, share: float) -> None:
-        self._faults.lose_bytes = _share(share)
+    def _worsen(self, fault: str, share: float) -> None:
+        if not 0 <= share <= 1:
+            raise ValueError("a share is from 0 to 1")
+        setattr(self._faults, fault, share)
 
     def _garbage(self, count: float) -> None:
         """Bytes that mean nothing, between two packets."""
@@ -160,12 +157,6 @@ def main(
     except (LidarError, OSError) as error:
         print(f"lidarcore: {error}", file=sys.stderr)
         raise SystemExit(2) from None
-
-
-def _share(share: float) -> float:
-    if not 0 <= share <= 1:
-        raise ValueError("a share is from 0 to 1")
-    return share
 
 
 if __name__ == "__main__":

@@ -7,8 +7,9 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
+from lidarcore.closing import Closing
 from lidarcore.errors import DeviceError
 from lidarcore.rplidar.emulation.options import FIRST_LINE, EmulatorOptions
 
@@ -18,7 +19,7 @@ _ANSWER_TIME = 10.0  # s
 _QUIT_TIME = 5.0  # s
 
 
-class EmulatorProcess:
+class EmulatorProcess(Closing):
     """An emulated S1 at `port`, with the options of EmulatorOptions; a context manager.
 
     noise   what its measurements err by
@@ -46,12 +47,6 @@ class EmulatorProcess:
         self._reader = threading.Thread(target=self._read, args=(on_end,), name="emulator", daemon=True)
         self._reader.start()
         self.port = self._first_line().removeprefix(FIRST_LINE)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     @property
     def pid(self) -> int:

@@ -6,7 +6,6 @@ from scipy.spatial import KDTree
 from lidarcore.arrays import Array
 from lidarcore.errors import SimulationError
 from lidarcore.geometry import left_of
-from lidarcore.simulation.posts import distances_to_circles
 from lidarcore.simulation.rooms import random_pose
 from lidarcore.simulation.world import World
 
@@ -76,11 +75,3 @@ class Person:
         return bool(self._avoid.query(way)[0].min() >= _SENSOR) and all(
             self._world.clearance(*at) >= _WALL for at in way
         )
-
-
-def distances_to_legs(legs: Array, positions: Array, directions: Array) -> Array:
-    """Distance (N,) m from each beam's origin to the nearest leg it meets, inf for none.
-
-    legs (L, N, 2), positions (N, 2) m, directions (N, 2) unit vectors, all in the world frame.
-    """
-    return distances_to_circles(legs, LEG, positions, directions)

@@ -32,8 +32,7 @@ def distances_to_circles(centres: Array, radius: float, positions: Array, direct
     aside = to_centre[..., 0] * directions[:, 1] - to_centre[..., 1] * directions[:, 0]
     half_chord = np.sqrt(np.maximum(radius**2 - aside**2, 0))
     meets = (half_chord > 0) & (along > half_chord)
-    distances: Array = np.where(meets, along - half_chord, np.inf).min(axis=0, initial=np.inf)
-    return distances
+    return np.where(meets, along - half_chord, np.inf).min(axis=0, initial=np.inf)
 
 
 def scattered(

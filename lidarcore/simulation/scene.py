@@ -8,8 +8,8 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.noise import SensorNoise
 from lidarcore.simulation.paths import Path
-from lidarcore.simulation.people import Person, distances_to_legs
-from lidarcore.simulation.posts import Posts
+from lidarcore.simulation.people import LEG, Person
+from lidarcore.simulation.posts import Posts, distances_to_circles
 from lidarcore.simulation.world import World
 
 
@@ -41,7 +41,7 @@ class Scene:
         distances = np.full(len(times), np.inf)
         if self.people:
             legs = np.concatenate([person.legs(times) for person in self.people])
-            distances = distances_to_legs(legs, positions, directions)
+            distances = distances_to_circles(legs, LEG, positions, directions)
         if self.posts is not None:
             distances = np.minimum(distances, self.posts.distances(positions, directions))
         return distances
@@ -85,5 +85,4 @@ def _sines(walls: Array, directions: Array) -> Array:
     """Sine (N,) of the angle between each wall (N, 2, 2) and unit vector (N, 2)."""
     along = walls[:, 1] - walls[:, 0]
     across = along[:, 0] * directions[:, 1] - along[:, 1] * directions[:, 0]
-    sines: Array = np.abs(across) / np.hypot(along[:, 0], along[:, 1])
-    return sines
+    return np.abs(across) / np.hypot(along[:, 0], along[:, 1])

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from lidarcore.arrays import Array
-from lidarcore.fields import number, settings
+from lidarcore.fields import number, settings, whole
 from lidarcore.localization.settings import OdometryNoise
 from lidarcore.noise import SensorNoise
 from lidarcore.simulation.worlds import WORLDS, place
@@ -37,8 +37,7 @@ class OdometryError:
         """What wheels say of a true increment (3,) m, m, rad, seen from where it starts."""
         systematic = increment * [1 + self.scale, 1 + self.scale, 1 + self.track]
         sigma = np.sqrt(np.diag(self.noise.covariance(increment)))
-        measured: Array = systematic + rng.normal(0, 1, 3) * sigma
-        return measured
+        return systematic + rng.normal(0, 1, 3) * sigma
 
 
 @settings
@@ -73,10 +72,8 @@ class SimulationSettings:
     dropouts: float = number(
         0, 1, "", "share of the beams that are lost for no reason. More: more holes in walls", default=0.003
     )
-    people: Annotated[
-        int, Field(ge=0, le=20, description="how many walk about. More: more that moves and hides walls")
-    ] = 0
-    seed: Annotated[int, Field(ge=0, le=2**31 - 1, description="of everything that is random")] = 0
+    people: int = whole(0, 20, "how many walk about. More: more that moves and hides walls", default=0)
+    seed: int = whole(0, 2**31 - 1, "of everything that is random", default=0)
 
     @model_validator(mode="after")
     def _known_place(self) -> "SimulationSettings":

@@ -6,7 +6,8 @@ import pytest
 from lidarcore import SensorNoise
 from lidarcore.simulation import World, furnished_room
 from lidarcore.simulation.paths import ROUND, standing, wandering
-from lidarcore.simulation.people import LEG, Person, distances_to_legs
+from lidarcore.simulation.people import LEG, Person
+from lidarcore.simulation.posts import distances_to_circles
 from lidarcore.simulation.scene import Optics, Scene
 
 ROOM = furnished_room()
@@ -72,7 +73,7 @@ def test_legs_are_circles():
     polygons = World(np.stack([corners, np.roll(corners, -1, axis=1)], 2).reshape(-1, 2, 2))
     directions = np.exp(1j * FULL_TURN).view(float).reshape(-1, 2)
     legs = np.repeat(centres[:, None], len(FULL_TURN), axis=1)
-    found = distances_to_legs(legs, np.zeros((len(FULL_TURN), 2)), directions)
+    found = distances_to_circles(legs, LEG, np.zeros((len(FULL_TURN), 2)), directions)
     expected = np.nan_to_num(polygons.cast(np.zeros(3), FULL_TURN)[0], nan=np.inf)
     meets = np.isfinite(expected)
     assert np.isfinite(found[meets]).mean() > 0.98  # but for beams that graze

@@ -10,8 +10,8 @@ from scipy import stats
 from typer.testing import CliRunner
 
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.repeatability.feature_set import FeatureSet, moved
 from lidarcore.evaluation.stations.agreement import GATE, Pair, coverage, differences, systematic_part
+from lidarcore.evaluation.stations.feature_set import FeatureSet, moved
 from lidarcore.geometry import act, inverse
 
 ROOM = np.array([[0, 0], [4, 0], [4, 1.5], [6, 1.5], [6, 5], [0, 5]], np.float64)

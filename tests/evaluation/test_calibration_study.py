@@ -16,7 +16,7 @@ from lidarcore.evaluation.calibration.wall_beams import beams_on_walls
 from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
 from lidarcore.simulation.rooms import rectangular_room
-from lidarcore.simulation.surface import Surface
+from lidarcore.simulation.world import Surface
 
 NOISE = SensorNoise(0.002, 0.001)
 

@@ -10,9 +10,9 @@ from scipy.stats import chi2, ncx2
 from lidarcore import ExtractionSettings, SensorNoise
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.figures import FIGURES, LEVELS, SUMS, tally
+from lidarcore.evaluation.consistency.places import places
 from lidarcore.evaluation.consistency.trials import Trials, simulate
 from lidarcore.evaluation.intervals import ratio, share
-from lidarcore.evaluation.repeatability.places import places
 from lidarcore.simulation.rooms import rectangular_room
 
 BLOCKS, CORNERS, DRAWS = 40, 60, 10

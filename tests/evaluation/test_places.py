@@ -8,8 +8,8 @@ import pytest
 from lidarcore import FITTERS, ExtractionSettings, SensorNoise, extract
 from lidarcore.evaluation.consistency.cramer_rao import corner_bound
 from lidarcore.evaluation.consistency.design import ROOMS, room
+from lidarcore.evaluation.consistency.places import MIN_BEAMS, places
 from lidarcore.evaluation.consistency.trials import measure, most_met, simulate
-from lidarcore.evaluation.repeatability.places import MIN_BEAMS, places
 from lidarcore.scan import Scan
 
 NOISE = SensorNoise(0.02, 0.002)

@@ -14,7 +14,7 @@ from html_tables import Tables
 from lidarcore import Scan
 from lidarcore.corners import intersect
 from lidarcore.errors import EvaluationError
-from lidarcore.evaluation.repeatability.places import MIN_BEAMS, MIN_EXTENT
+from lidarcore.evaluation.consistency.places import MIN_BEAMS, MIN_EXTENT
 from lidarcore.experiments import cwlf, wctls
 from lidarcore.experiments.claim_rules import RULES
 from lidarcore.experiments.corner_study import recorded

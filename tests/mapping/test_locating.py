@@ -17,6 +17,7 @@ from lidarcore.geometry import compose, pose_difference, relative, squared_mahal
 from lidarcore.localization import TrackingResult
 from lidarcore.mapping import MapPicture, WholeScans
 from lidarcore.mapping.grid import OccupancyGrid, build_grid
+from lidarcore.mapping.live import locate_worker
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings
@@ -135,6 +136,20 @@ def test_where_two_places_look_alike_a_person_can_say_which() -> None:
         results = followed(tracker, scans[10:])
     assert {one.state for one in results} == {"tracking"}
     assert np.abs(errors(results, scans[10:])).max() < 0.08
+
+
+def test_of_a_long_drive_the_newest_part_of_the_path_is_kept(
+    known: MapPicture, drive: list[Scan], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with closing(WholeScans(SETTINGS, known=known, background=False)) as whole:
+        expected = followed(whole, drive[:200])[-1]
+        path = whole.path()
+    monkeypatch.setattr(locate_worker, "_PATH", 5)
+    with closing(WholeScans(SETTINGS, known=known, background=False)) as tracker:
+        found = followed(tracker, drive[:200])[-1]
+        assert len(path) > 10
+        assert np.array_equal(tracker.path(), path[-6:])
+    assert np.array_equal(found.estimate.pose, expected.estimate.pose)
 
 
 def test_a_pose_told_wrongly_is_not_tracked(tracker: WholeScans, drive: list[Scan]) -> None:

@@ -17,7 +17,7 @@ import pytest
 from backports import zstd
 
 from lidarcore.errors import RecordingError
-from lidarcore.foreign_database import bound
+from lidarcore.files.foreign_database import bound
 from lidarcore.recordings import open_recording
 
 MEBIBYTE = 1 << 20

@@ -30,7 +30,7 @@ class Cell:
         """Scatter of corners or walls against their claims, while the sensor stands still."""
         parts = [one.corners if corners else one.walls for one in self.trials]
         known = [part for part in parts if part is not None]
-        return Figures.together(known) if known else None
+        return Figures.joined(known) if known else None
 
 
 @dataclass(frozen=True, slots=True)

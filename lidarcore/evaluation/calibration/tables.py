@@ -7,7 +7,7 @@ from typing import Any
 
 from lidarcore import files
 from lidarcore.evaluation.calibration.study import CalibrationStudy, Cell
-from lidarcore.evaluation.repeatability.tables import finite
+from lidarcore.files.texts import finite
 
 
 def write(study: CalibrationStudy, path: Path) -> None:

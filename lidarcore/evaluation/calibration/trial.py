@@ -10,8 +10,8 @@ from lidarcore.evaluation.calibration.design import PARTS, Design
 from lidarcore.evaluation.calibration.result import Calibration
 from lidarcore.evaluation.calibration.true_walls import held
 from lidarcore.evaluation.consistency.design import KINDS, room
+from lidarcore.evaluation.consistency.places import CLEARANCE
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.evaluation.repeatability.places import CLEARANCE
 from lidarcore.evaluation.stations.study import Figures, seen
 from lidarcore.extraction import extract
 from lidarcore.noise import SensorNoise

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lidarcore.arrays import Array
-from lidarcore.compiled import inlined
+from lidarcore.arrays import Array, Ints
+from lidarcore.compiled import inlined, kernel
 from lidarcore.corners import intersect
 from lidarcore.lines import LINE_FIELDS
 from lidarcore.noise import SensorNoise
@@ -30,16 +30,31 @@ def corner_bound(
     bearings (N,) rad are the true ones at which beams meet each wall. They are unknown to an estimator too; with them
     eliminated, a beam is worth the inverse of its effective variance.
     """
-    rows = [_bounded(*line, angles, noise) for line, angles in zip(lines, bearings, strict=True)]
-    corner = np.empty(CORNER_FIELDS)
-    intersect(rows[0], rows[1], corner)
-    return corner[CORNER_CONSISTENT : CORNER_CONSISTENT + 4].reshape(2, 2)
+    angles = [as_row(of_wall, "bearings") for of_wall in bearings]
+    count = np.array([[len(of_wall) for of_wall in angles]])
+    normals = np.array([[(np.cos(alpha), np.sin(alpha), r) for alpha, r in lines]])
+    bounds, variances = np.empty((1, 2, 2)), (noise.sigma_range**2, noise.sigma_bearing**2)
+    bound_corners(np.concatenate(angles), np.cumsum(count, 1) - count, count, normals, *variances, bounds)
+    return bounds[0]
 
 
-def _bounded(alpha: float, r: float, bearings: ArrayLike, noise: SensorNoise) -> Array:
-    row, variances = np.empty(LINE_FIELDS), (noise.sigma_range**2, noise.sigma_bearing**2)
-    bounded_line(as_row(bearings, "bearings"), np.cos(alpha), np.sin(alpha), r, *variances, row)
-    return row
+@kernel
+def bound_corners(
+    bearings: Array, first: Ints, count: Ints, lines: Array, v_rho: float, v_theta: float, bounds: Array
+) -> None:
+    """Write bounds (P, 2, 2) m² of corners into `bounds`.
+
+    Beams of both walls of each begin at first (P, 2) and are count (P, 2) of the true bearings (N,) rad; lines
+    (P, 2, 3) are unit normals and distances in m.
+    """
+    rows, corner = np.empty((2, LINE_FIELDS)), np.empty(CORNER_FIELDS)
+    for p in range(len(first)):
+        for k in range(2):
+            a = first[p, k]
+            nx, ny, r = lines[p, k]
+            bounded_line(bearings[a : a + count[p, k]], nx, ny, r, v_rho, v_theta, rows[k])
+        intersect(rows[0], rows[1], corner)
+        bounds[p] = corner[CORNER_CONSISTENT : CORNER_CONSISTENT + 4].copy().reshape(2, 2)
 
 
 @inlined

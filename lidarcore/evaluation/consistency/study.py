@@ -11,9 +11,9 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.evaluation.consistency.design import KINDS, Design, room
 from lidarcore.evaluation.consistency.figures import FIGURES, SUMS, tally
+from lidarcore.evaluation.consistency.places import Place, places
 from lidarcore.evaluation.consistency.trials import Segmentation, simulate
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.evaluation.repeatability.places import Place, places
 from lidarcore.evaluation.workers import outcomes
 from lidarcore.lines import FITTERS
 from lidarcore.noise import SensorNoise

@@ -1,9 +1,5 @@
 """A study of consistency as a file: JSON or CSV, or a report in HTML."""
 
-import csv
-import io
-import json
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -15,6 +11,7 @@ from lidarcore.evaluation.consistency.figures import FIGURES
 from lidarcore.evaluation.consistency.report import html
 from lidarcore.evaluation.consistency.study import Consistency, Row
 from lidarcore.evaluation.intervals import LEVEL
+from lidarcore.files.texts import csv_text, finite, json_text
 
 FORMATS = (".json", ".csv")
 STUDY_FORMATS = (*FORMATS, ".html")
@@ -50,12 +47,11 @@ def to_json(study: Consistency) -> str:
         "confidence": LEVEL,
         "figures": {figure.name: {"title": figure.title, "unit": figure.unit} for figure in FIGURES.values()},
         "rows": [
-            _keys(row)
-            | {name: [_finite(x) for x in (i.value, i.low, i.high)] for name, i in row.figures.items()}
+            _keys(row) | {name: [i.value, i.low, i.high] for name, i in row.figures.items()}
             for row in study.rows()
         ],
     }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+    return json_text(document)
 
 
 def to_csv(rows: Iterable[Row]) -> str:
@@ -63,17 +59,13 @@ def to_csv(rows: Iterable[Row]) -> str:
     lines = [
         _keys(row)
         | {
-            name + end: _finite(value)
+            name + end: value
             for name, i in row.figures.items()
             for end, value in (("", i.value), ("_low", i.low), ("_high", i.high))
         }
         for row in rows
     ]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(lines)
-    return text.getvalue()
+    return csv_text(finite(lines))
 
 
 def _keys(row: Row) -> dict[str, Any]:
@@ -85,7 +77,3 @@ def _keys(row: Row) -> dict[str, Any]:
         "fitter": row.fitter,
         "covariance": row.covariance,
     }
-
-
-def _finite(x: float) -> float | None:
-    return x if math.isfinite(x) else None

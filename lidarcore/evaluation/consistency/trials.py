@@ -6,10 +6,10 @@ from typing import Literal, cast
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.compiled import kernel
 from lidarcore.corners import intersect
-from lidarcore.evaluation.repeatability.places import Place
+from lidarcore.evaluation.consistency.places import Place
 from lidarcore.extraction import compiled_call
 from lidarcore.geometry.kernels import wrap
 from lidarcore.lines import FITTER_IDS, FITTERS, LINE_FIELDS, WORK, fit_piece
@@ -32,7 +32,7 @@ CORNER = CORNER_FIELDS  # error (2) and covariances: a corner as `intersect` wri
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trials:
+class Trials(Columns):
     """P corners, each estimated from K independent scans from one place by one method; sensor frame.
 
     errors       (P, K, 2) m, estimate minus truth; NaN where no corner came out
@@ -118,25 +118,16 @@ def _fit_known(
         for p in range(len(first)):
             for side in range(2):
                 a, b = first[p, side], first[p, side] + count[p, side]
-                if (
-                    side == 0 and p > 0 and first[p - 1, 1] == a
-                ):  # it was the second wall of the corner before
+                # It was the second wall of the corner before.
+                if side == 0 and p > 0 and first[p - 1, 1] == a:
                     fitted[0], status[0] = fitted[1], status[1]
                     continue
                 behind = np.any(rho[a:b] <= 0)
                 for f in range(fitters):
                     row = fitted[side, f]
                     # Inlined, not a kernel called: linked copies of one may round differently from process to process.
-                    fit = fit_piece(
-                        f,
-                        rho[a:b],
-                        c[a:b],
-                        s[a:b],
-                        noise,
-                        (work[0, a:b], work[1, a:b], work[2, a:b]),
-                        (True, True),
-                        row,
-                    )
+                    scratch = (work[0, a:b], work[1, a:b], work[2, a:b])
+                    fit = fit_piece(f, rho[a:b], c[a:b], s[a:b], noise, scratch, (True, True), row)
                     status[side, f] = NOT_FINITE if behind else fit
             for f in range(fitters):
                 out[p, k, f] = np.nan

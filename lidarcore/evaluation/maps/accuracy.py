@@ -21,8 +21,7 @@ def close_pairs(reference: Array) -> Ints:
     """Pairs (M, 2) i < j of poses (N, 3) less than 3 m from each other and more than 30 scans apart."""
     pairs = cKDTree(reference[:, :2]).query_pairs(NEAR, output_type="ndarray").astype(np.int64)
     pairs = np.sort(pairs, axis=1)
-    apart: Ints = pairs[pairs[:, 1] - pairs[:, 0] > APART]
-    return apart
+    return pairs[pairs[:, 1] - pairs[:, 0] > APART]
 
 
 def relative_errors(poses: Array, reference: Array, pairs: Ints) -> Array:

@@ -1,11 +1,12 @@
 """A recording with reference poses is mapped, and the map is judged by them."""
 
-import resource
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import psutil
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import EvaluationError
@@ -68,12 +69,12 @@ def prepared(scans: list[Scan], odometry: str, seed: int) -> tuple[list[Scan], A
     except EvaluationError:
         if odometry == "poor":
             raise
-        return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), None
+        reference, stands_in = None, False
     if odometry == "recorded" and stands_in:
         raise EvaluationError(
             "The log's odometry is all the reference there is: choose poor odometry, or none."
         )
-    if odometry == "poor" or (odometry == "auto" and stands_in):
+    if reference is not None and (odometry == "poor" or (odometry == "auto" and stands_in)):
         return with_poor_odometry(scans, reference, seed), reference
     return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), reference
 
@@ -93,7 +94,6 @@ def study(
         progress(number)
     mapper.finish()
     seconds = time.process_time() - began
-    megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     stamps, poses = mapper.trajectory()
     numbers = mapper.keyframes.numbers
     pairs, normalised, allowed, wrong = np.empty((0, 2)), np.empty(0), np.empty(0), None
@@ -103,9 +103,18 @@ def study(
         wrong = wrong_loops(mapper.loops, reference[numbers])
     found = np.empty((0, 3)) if relations is None else relation_errors(relations, stamps, poses)
     return MapStudy(
-        len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, megabytes,
+        len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, _most_megabytes(),
         pairs, normalised, allowed, found,
     )  # fmt: skip
+
+
+def _most_megabytes() -> float:
+    """The most memory that this process has had."""
+    if sys.platform == "win32":
+        return float(psutil.Process().memory_info().peak_wset) / 2**20
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
 
 
 def _lengths(errors: Array) -> Array:
@@ -137,5 +146,4 @@ def wrong_loops(loops: Sequence[Loop], reference: Array) -> int:
 def wrong_poses(poses: Array, reference: Array) -> Mask:
     """Which poses (N, 3) are more than 0.5 m or 0.2 rad off."""
     off = pose_difference(poses, reference)
-    wrong: Mask = (np.hypot(off[:, 0], off[:, 1]) > _WRONG) | (np.abs(off[:, 2]) > _WRONG_TURN)
-    return wrong
+    return (np.hypot(off[:, 0], off[:, 1]) > _WRONG) | (np.abs(off[:, 2]) > _WRONG_TURN)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.evaluation.consistency.design import KINDS
 
 OBSERVATION = 10
@@ -12,7 +12,7 @@ OBSERVATION = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observations:
+class Observations(Columns):
     """R observations of features, all corners or all walls; for `scatter.scatter` sorted by feature and then by scan.
 
     ids, scans (R,); table (R, M, OBSERVATION) for M methods, NaN where a method did not find the feature; (R, 2) of
@@ -28,23 +28,6 @@ class Observations:
         """(K,) where each feature begins."""
         return np.flatnonzero(np.diff(self.ids, prepend=-1))
 
-    def without(self, n: int) -> "Observations":
-        """All but the first n observations."""
-        return Observations(self.ids[n:], self.scans[n:], self.table[n:])
-
-    def followed_by(self, other: "Observations") -> "Observations":
-        """These observations, then others."""
-        return Observations(
-            np.concatenate([self.ids, other.ids]),
-            np.concatenate([self.scans, other.scans]),
-            np.concatenate([self.table, other.table]),
-        )
-
-
-def one_sigma_areas(table: Array) -> Array:
-    """(..., 2) areas of the claimed one-sigma ellipses of observations (..., OBSERVATION), by KINDS."""
-    return np.pi * root_det(covariances(table))
-
 
 def covariances(table: Array) -> Array:
     """(..., 2, 4) claimed of observations (..., OBSERVATION), by KINDS."""
@@ -53,5 +36,4 @@ def covariances(table: Array) -> Array:
 
 def root_det(c: Array) -> Array:
     """Root of the determinant (...) of covariances (..., 4), 0 where that is negative."""
-    root: Array = np.sqrt(np.maximum(c[..., 0] * c[..., 3] - c[..., 1] * c[..., 2], 0.0))
-    return root
+    return np.sqrt(np.maximum(c[..., 0] * c[..., 3] - c[..., 1] * c[..., 2], 0.0))

@@ -53,16 +53,11 @@ class Scatter:
         (Wishart in the plane with n - 1 of them): root(det A) / (n - 2) has the mean root(det C).
         """
         xx, xy, yy = np.moveaxis(self.squares, -1, 0)
-        actual: Array = np.sqrt(np.maximum(xx * yy - xy * xy, 0.0)) / np.maximum(self.counts - 2, 1)
-        return actual
-
-    def claimed(self, kind: int) -> Array:
-        """(K, M) root(det) of the mean claimed covariance."""
-        claimed: Array = self._claimed[..., kind]
-        return claimed
+        return np.sqrt(np.maximum(xx * yy - xy * xy, 0.0)) / np.maximum(self.counts - 2, 1)
 
     @cached_property
-    def _claimed(self) -> Array:
+    def claimed(self) -> Array:
+        """(K, M, kinds) root(det) of the mean claimed covariance."""
         return root_det(covariances(self.means))
 
     def features(self) -> list[tuple[FeatureScatter, ...]]:
@@ -86,7 +81,7 @@ class Scatter:
         return [tuple(features[begin:end]) for begin, end in pairwise([0, *ends])]
 
     def _claims(self, at: tuple[Ints, Ints]) -> Iterator[dict[str, FeatureClaim]]:
-        n, claimed = self.counts[at], self._claimed[at]  # (G,), (G, kinds)
+        n, claimed = self.counts[at], self.claimed[at]  # (G,), (G, kinds)
         ratios = _area_ratios(claimed, self.actual[at][:, None], (2 * n - 4)[:, None])
         shares = self.hits[at] / n[:, None, None]
         covers = np.array([shares, *wilson(shares, n[:, None, None])])  # (3, G, kinds, levels)
@@ -114,8 +109,7 @@ class Scatter:
         if not actual.any():
             return np.full((3, len(KINDS)), np.nan)
         dof = 2 * actual.sum() ** 2 / (actual**2 / (self.counts[good, method] - 2)).sum()
-        claimed = np.array([self.claimed(kind)[good, method].sum() for kind in range(len(KINDS))])
-        return _area_ratios(claimed, actual.sum(), dof)
+        return _area_ratios(self.claimed[good, method].sum(0), actual.sum(), dof)
 
 
 def _judgements(ratios: Array, covers: Array) -> list[Judgement]:
@@ -170,9 +164,8 @@ def scatter(observations: Observations, scans: int) -> Scatter:
 def _tally(nees: Array, judged: Bools, groups: Ints, n: int) -> Array:
     """(n, M, 2, 4) of residuals (M, 2, R) in n groups (R,): those within the ellipses of GATES, and all; none else."""
     cells = np.arange(np.prod(nees.shape[:2])).reshape(*nees.shape[:2], 1)
-    within = sum(
-        (nees <= gate).astype(np.int64) for gate in GATES
-    )  # of 1, 2 or 3, as larger ones hold it, too
+    # Within so many ellipses of 3: the larger ones hold what a smaller one does.
+    within = sum((nees <= gate).astype(np.int64) for gate in GATES)
     keys = (groups * cells.size + cells) * (len(GATES) + 2) + np.where(judged[:, None], within + 1, 0)
     shape = (n, *nees.shape[:2], len(GATES) + 2)
     counts = np.bincount(keys.ravel(), minlength=int(np.prod(shape))).reshape(shape)

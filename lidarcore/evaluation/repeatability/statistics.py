@@ -16,9 +16,9 @@ from lidarcore.evaluation.repeatability.standstill import moves
 from lidarcore.evaluation.repeatability.summary import CornerMethod, Summary, WallMethod, WallSummary
 from lidarcore.evaluation.repeatability.wall_tracker import WallRow, WallTracker, told_near
 from lidarcore.evaluation.repeatability.window import FeatureWindow
-from lidarcore.features import Features
+from lidarcore.features import Corners, Features
 from lidarcore.geometry import unit_vectors
-from lidarcore.lines import FITTERS
+from lidarcore.lines import FITTERS, Lines
 from lidarcore.tracking import CornerRow, Tracker
 
 WINDOW = 100
@@ -71,8 +71,10 @@ class Repeatability:
             )
         features = {name: features[name] for name in self.methods}
         corners, walls = self._corner_tracker.rows(features), self._wall_tracker.rows(features)
-        self.corners.add(corners, self._table(corners, [_corners_seen(found) for found in features.values()]))
-        table = self._table(walls, [_walls_seen(found) for found in features.values()])
+        of_corners = [_seen(found.corners.xy, found.corners) for found in features.values()]
+        self.corners.add(corners, self._table(corners, of_corners))
+        lines = [found.lines for found in features.values()]
+        table = self._table(walls, [_seen(np.column_stack([one.alpha, one.r]), one) for one in lines])
         near = np.array([row.near for row in walls])
         self.walls.add(walls, told_near(table, near[:, None]))
         if not self._standing:
@@ -140,25 +142,12 @@ class Repeatability:
         return f"The sensor moved {ago}: the window was started again."
 
 
-def _corners_seen(found: Features) -> Array:
-    """(K, OBSERVATION)"""
-    corners = found.corners
-    published, consistent = (
-        c.reshape(-1, 4) for c in (corners.covariance_published, corners.covariance_consistent)
-    )
-    return np.column_stack([corners.xy, published, consistent])
-
-
-def _walls_seen(found: Features) -> Array:
-    """(M, OBSERVATION)"""
-    lines = found.lines
-    published, consistent = (
-        c.reshape(-1, 4) for c in (lines.covariance_published, lines.covariance_consistent)
-    )
-    return np.column_stack([lines.alpha, lines.r, published, consistent])
+def _seen(coordinates: Array, of: Corners | Lines) -> Array:
+    """(N, OBSERVATION) of corners or lines that have these coordinates (N, 2)."""
+    claims = (c.reshape(-1, 4) for c in (of.covariance_published, of.covariance_consistent))
+    return np.column_stack([coordinates, *claims])
 
 
 def _feet(lines: Array) -> Array:
     """(R, 2) m, the points of lines (alpha, r) next to the sensor."""
-    feet: Array = lines[:, 1:] * unit_vectors(lines[:, 0])
-    return feet
+    return lines[:, 1:] * unit_vectors(lines[:, 0])

@@ -1,8 +1,5 @@
 """Repeatability as a file: JSON with every corner and wall, or CSV with a line for each method and covariance."""
 
-import csv
-import io
-import json
 from collections.abc import Iterator, Sized
 from dataclasses import asdict
 from pathlib import Path
@@ -11,6 +8,9 @@ from typing import Any
 from lidarcore import files
 from lidarcore.evaluation.consistency.tables import check
 from lidarcore.evaluation.repeatability.summary import Method, Summary
+from lidarcore.files.texts import csv_text, finite, json_text
+
+__all__ = ["finite", "json_text", "to_csv", "to_json", "write"]
 
 
 def write(summary: Summary, path: Path) -> None:
@@ -29,12 +29,7 @@ def to_csv(summary: Summary) -> str:
 
     Ends of the 95 % intervals are figure_low and figure_high.
     """
-    text = io.StringIO()
-    lines = list(_lines(summary))
-    writer = csv.DictWriter(text, list(lines[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(finite(lines))
-    return text.getvalue()
+    return csv_text(finite(list(_lines(summary))))
 
 
 def _lines(summary: Summary) -> Iterator[dict[str, Any]]:
@@ -58,13 +53,3 @@ def _lines(summary: Summary) -> Iterator[dict[str, Any]]:
                 line |= {figure: interval["value"]}
                 line |= {f"{figure}_{end}": interval[end] for end in ("low", "high")}
             yield line
-
-
-def json_text(document: Any) -> str:
-    """A document as the text of a JSON file, with null for every number that is not finite."""
-    return json.dumps(finite(document), indent=1, allow_nan=False) + "\n"
-
-
-def finite(document: Any) -> Any:
-    """A document for JSON with None for every number that is not finite."""
-    return json.loads(json.dumps(document), parse_constant=lambda _: None)

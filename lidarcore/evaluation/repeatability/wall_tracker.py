@@ -1,11 +1,11 @@
 """Walls followed from scan to scan while the sensor stands still."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from lidarcore.arrays import Array, Bools, Ints
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.features import Features
 from lidarcore.geometry import wrap
 
@@ -26,7 +26,7 @@ class WallRow:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Known:
+class _Known(Columns):
     """K walls as they were seen so far, the oldest first.
 
     ids, frames (K,) of the last observation; near (K,) rad, alpha of the first; lines (K, 4) alpha, r, begin, end: from
@@ -38,17 +38,8 @@ class _Known:
     near: Array
     lines: Array
 
-    @classmethod
-    def nothing(cls) -> "_Known":
-        return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty((0, 4)))
 
-    def __getitem__(self, which: Bools) -> "_Known":
-        return _Known(self.ids[which], self.frames[which], self.near[which], self.lines[which])
-
-    def __add__(self, other: "_Known") -> "_Known":
-        return _Known(
-            *(np.concatenate([getattr(one, f.name) for one in (self, other)]) for f in fields(self))
-        )
+_NOTHING = _Known(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0), np.empty((0, 4)))
 
 
 class WallTracker:
@@ -65,11 +56,11 @@ class WallTracker:
 
     def __init__(self, memory: int, follow: float = 1.0) -> None:
         self.memory, self.follow = memory, follow
-        self._known, self._frame, self._next_id = _Known.nothing(), 0, 1
+        self._known, self._frame, self._next_id = _NOTHING, 0, 1
 
     def forget(self) -> None:
         """Forget all walls: those of another scene are new. Ids are never used again."""
-        self._known = _Known.nothing()
+        self._known = _NOTHING
 
     def rows(self, features: Mapping[str, Features]) -> tuple[WallRow, ...]:
         """The walls of one frame with their ids; extents are those of the first method that has them."""
@@ -104,11 +95,12 @@ class WallTracker:
 
     def _begin(self, lines: Array) -> Ints:
         """Know walls (P, 6) from now on; (P,) where they are kept."""
-        k, n = len(self._known.ids), len(lines)
+        k, n = len(self._known), len(lines)
         ids, self._next_id = self._next_id + np.arange(n), self._next_id + n
         alpha = lines[:, 0]
         seen = np.column_stack([lines[:, :2], _along(lines, alpha)])
-        self._known += _Known(ids, np.full(n, self._frame), alpha, seen)
+        new = _Known(ids, np.full(n, self._frame), alpha, seen)
+        self._known = _Known.joined([self._known, new])
         return k + np.arange(n)
 
 
@@ -144,20 +136,17 @@ def _pieces(features: Mapping[str, Features]) -> list[dict[str, int]]:
 def _lines(features: Mapping[str, Features], pieces: list[dict[str, int]]) -> Array:
     """(P, 6) alpha, r, start x, y, end x, y of each piece by the first method that has it."""
     owners = [next(iter(piece.items())) for piece in pieces]
-    tables = {name: _table(features[name]) for name in {name for name, _ in owners}}
+    tables = {}
+    for name in {name for name, _ in owners}:
+        lines, segments = features[name].lines, features[name].segments
+        tables[name] = np.column_stack([lines.alpha, lines.r, segments.start, segments.end])
     return np.array([tables[name][i] for name, i in owners]).reshape(-1, 6)
-
-
-def _table(found: Features) -> Array:
-    lines, segments = found.lines, found.segments
-    return np.column_stack([lines.alpha, lines.r, segments.start, segments.end])
 
 
 def _along(lines: Array, alpha: Array) -> Array:
     """(P, 2) from where to where (m) along walls with the normals alpha (P,) pieces (P, 6) go."""
     tangents = np.column_stack([-np.sin(alpha), np.cos(alpha)])
-    along: Array = np.sort((lines[:, 2:].reshape(-1, 2, 2) @ tangents[..., None])[..., 0], axis=1)
-    return along
+    return np.sort((lines[:, 2:].reshape(-1, 2, 2) @ tangents[..., None])[..., 0], axis=1)
 
 
 def shared_extents(lines: Array, known: Array, noise: float) -> Array:

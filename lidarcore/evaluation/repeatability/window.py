@@ -11,7 +11,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.consistency.design import KINDS
-from lidarcore.evaluation.repeatability.observations import OBSERVATION, Observations, one_sigma_areas
+from lidarcore.evaluation.repeatability.observations import OBSERVATION, Observations, covariances, root_det
 from lidarcore.evaluation.repeatability.scatter import LEAST, Scatter, scatter
 from lidarcore.evaluation.repeatability.summary import WHISKER, Box, Claim, FeatureScatter, verdict
 from lidarcore.evaluation.repeatability.wall_tracker import WallRow
@@ -49,8 +49,9 @@ class FeatureWindow:
         ids = np.array([row.id for row in rows], np.int64)
         new = Observations(ids, np.full(len(ids), self._added), table[k, first, :2])
         oldest = len(self._records[0].table) if len(self) == self._records.maxlen else 0
-        self._firsts = self._firsts.without(oldest).followed_by(new)
-        self._records.append(_Record(table, _medians(one_sigma_areas(table))))
+        self._firsts = Observations.joined([self._firsts[oldest:], new])
+        one_sigma_areas = np.pi * root_det(covariances(table))
+        self._records.append(_Record(table, _medians(one_sigma_areas)))
         self._added += 1
 
     def observations(self) -> Observations:
@@ -125,8 +126,7 @@ def _medians(values: Array) -> Array:
     ordered = np.sort(values, axis=0)  # NaN last
     n = np.isfinite(values).sum(0)
     padded, rest = np.concatenate([ordered, np.full((1, *n.shape), np.nan)]), tuple(np.indices(n.shape))
-    medians: Array = (padded[np.maximum(n - 1, 0) // 2, *rest] + padded[n // 2, *rest]) / 2
-    return medians
+    return (padded[np.maximum(n - 1, 0) // 2, *rest] + padded[n // 2, *rest]) / 2
 
 
 def _boxes(values: Array) -> Iterator[Box | None]:

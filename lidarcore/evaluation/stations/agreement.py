@@ -11,8 +11,8 @@ import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.evaluation.consistency.figures import GATES, LEVELS
-from lidarcore.evaluation.repeatability.feature_set import FeatureSet, moved, moved_ends
 from lidarcore.evaluation.repeatability.wall_tracker import shared_extents, unwrapped
+from lidarcore.evaluation.stations.feature_set import FeatureSet, moved
 from lidarcore.geometry import act, act_jacobians, squared_mahalanobis
 
 _STEPS = 5
@@ -136,8 +136,7 @@ class _Walls:
 
     def but(self, i: int) -> Bools:
         """All walls but this one."""
-        others: Bools = np.arange(len(self.e)) != i
-        return others
+        return np.arange(len(self.e)) != i
 
     def is_told(self, i: int) -> bool:
         """Whether the others tell where this wall is, about as well as it is seen itself."""
@@ -161,7 +160,7 @@ def _matches(pair: Pair) -> Ints:
     first, second = pair.first, pair.second
     known = np.array([_extent(line, ends) for line, ends in zip(first.lines, first.ends, strict=True)])
     lines = moved(second.lines, pair.pose)[0]
-    pieces = np.column_stack([lines, moved_ends(second.ends, pair.pose).reshape(-1, 4)])
+    pieces = np.column_stack([lines, act(pair.pose, second.ends).reshape(-1, 4)])
     shares = shared_extents(pieces, known.reshape(-1, 4), 0.0)
     found: list[tuple[int, int]] = []
     for b, a in np.argwhere(shares > 0)[np.argsort(-shares[shares > 0])].tolist():

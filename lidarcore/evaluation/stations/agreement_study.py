@@ -9,8 +9,8 @@ import numpy as np
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.intervals import Interval, share
-from lidarcore.evaluation.repeatability.feature_set import FeatureSet
 from lidarcore.evaluation.stations.agreement import GATE, Differences, Pair, differences, systematic_part
+from lidarcore.evaluation.stations.feature_set import FeatureSet
 from lidarcore.extraction import extract
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.matching.correlative import search
@@ -69,7 +69,7 @@ def study(
     Stations that do not show the same place are no neighbours. Raises EvaluationError if fewer than two pairs are.
     """
     settings = settings or ExtractionSettings()
-    groups: dict[str, _Group] = {}
+    groups: dict[str, dict[Covariance, list[Pair]]] = {}
     prepared = (_prepared(name, scans, settings, calibrated) for name, scans in stations)
     for first, second in pairwise(prepared):
         group = _pairs(first, second)
@@ -81,10 +81,10 @@ def study(
             "Agreement needs a sensor that stood still at three places or more, each in view of the one before; "
             f"there are {len(groups)} such pairs of neighbours here."
         )
-    names, pairs = list(groups), [group.map for group in groups.values()]
+    names, pairs = list(groups), [group["map"] for group in groups.values()]
     halves = (systematic_part(pairs[1::2]), systematic_part(pairs[::2]))
     return AgreementStudy(
-        _judged(names, [group.consistent for group in groups.values()], (0.0,)),
+        _judged(names, [group["consistent"] for group in groups.values()], (0.0,)),
         _judged(names, pairs, (0.0,)),
         _judged(names, pairs, halves),
     )
@@ -97,21 +97,10 @@ class _Station:
     feature_sets: dict[Covariance, list[FeatureSet]]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Group:
-    """Pairs of scans from two stations, with either claim."""
-
-    consistent: list[Pair]
-    map: list[Pair]
-
-
 def _prepared(name: str, scans: Sequence[Scan], settings: ExtractionSettings, calibrated: bool) -> _Station:
     """A station with the features of scans spread over the second half of its scans."""
     half = len(scans) // 2
-    noise = settings.noise
-    if calibrated:
-        noise = _calibrated(scans[:half], noise)
-    chosen = replace(settings, noise=noise)
+    chosen = replace(settings, noise=_calibrated(scans[:half], settings.noise)) if calibrated else settings
     at = np.linspace(half, len(scans) - 1, SCANS).astype(int).tolist()
     kinds: tuple[Covariance, ...] = ("consistent", "map")
     feature_sets = {
@@ -128,19 +117,15 @@ def _calibrated(scans: Sequence[Scan], usual: SensorNoise) -> SensorNoise:
         return usual
 
 
-def _pairs(first: _Station, second: _Station) -> _Group | None:
-    """Pairs of scans from both stations, one by one; None if the stations do not lie on each other."""
+def _pairs(first: _Station, second: _Station) -> dict[Covariance, list[Pair]] | None:
+    """Pairs of scans from both stations, one by one, by claim; None if the stations do not lie on each other."""
     registered = _registered(first.middle, second.middle)
     if registered.inliers < _INLIERS:
         return None
-    consistent, for_maps = (
-        [
-            Pair(a, b, registered.pose)
-            for a, b in zip(first.feature_sets[kind], second.feature_sets[kind], strict=True)
-        ]
-        for kind in first.feature_sets
-    )
-    return _Group(consistent, for_maps)
+    return {
+        kind: [Pair(a, b, registered.pose) for a, b in zip(sets, second.feature_sets[kind], strict=True)]
+        for kind, sets in first.feature_sets.items()
+    }
 
 
 def _registered(reference: Scan, scan: Scan) -> Registration:

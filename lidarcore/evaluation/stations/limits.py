@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from lidarcore.evaluation.stations.study import Figures, StationStudy
+from lidarcore.evaluation.stations.study import StationStudy
 
 COVERAGE = (0.93, 0.98)  # of 95 % ellipses, all stations together
 LOWEST_STATION = 0.88  # of those with sightings or windows enough to stand for themselves
@@ -50,12 +50,7 @@ def _scatter(study: StationStudy, m: int) -> Iterator[Limit]:
     if study.walls.sightings(m):
         yield Limit("walls", method, heading, study.walls.scatter_against(m, other).value, None, SCATTER)
     for of, figures in (("walls", study.walls), ("corners", study.corners)):
-        lows = [one.scatter_against(m, other).low for one in _stations(figures) if one.stands(m)]
+        lows = [one.scatter_against(m, other).low for one in figures.stations().values() if one.stands(m)]
         known = [low for low in lows if low == low]
         if known:
             yield Limit(of, method, f"{heading}, surely, worst station", max(known), None, 1.0)
-
-
-def _stations(figures: Figures) -> Iterator[Figures]:
-    for number in sorted(set(figures.station.tolist())):
-        yield figures[figures.station == number]

@@ -1,17 +1,17 @@
 """Ellipses after calibration: each station's first half tells the noise, its second half judges what it leads to."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
 
-from lidarcore.arrays import Array, Bools, Ints
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.errors import EvaluationError
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.consistency.design import KINDS
 from lidarcore.evaluation.consistency.figures import LEVELS
-from lidarcore.evaluation.intervals import LEVEL, Interval, share
+from lidarcore.evaluation.intervals import LEVEL, UNKNOWN, Interval, share
 from lidarcore.evaluation.repeatability.scatter import LEAST, Scatter
 from lidarcore.evaluation.repeatability.statistics import WINDOW, Repeatability
 from lidarcore.extraction import compare
@@ -27,7 +27,7 @@ SHORTEST = 40  # scans of a station that is judged at all
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Figures:
+class Figures(Columns):
     """F features, each judged in one window, by M methods: corners in m², walls in rad m.
 
     counts (F, M) of sightings; hits (F, M) of them in the 95 % ellipse; claimed and actual (F, M), root(det) of the
@@ -51,24 +51,11 @@ class Figures:
         return cls(
             np.where(good, found.counts, 0.0)[some],
             np.where(good, found.hits[:, :, kind, LEVELS.index(0.95)], 0.0)[some],
-            np.where(scatters, found.claimed(kind), np.nan)[some],
+            np.where(scatters, found.claimed[..., kind], np.nan)[some],
             np.where(scatters, found.actual, np.nan)[some],
             window * numbers,
             station * numbers,
         )
-
-    @classmethod
-    def together(cls, parts: Sequence["Figures"]) -> "Figures":
-        """Figures of several windows together; the numbers of the windows differ."""
-        columns = [[getattr(part, field.name) for part in parts] for field in fields(cls)]
-        return cls(*(np.concatenate(column) for column in columns))
-
-    def __len__(self) -> int:
-        return len(self.counts)
-
-    def __getitem__(self, which: Bools) -> "Figures":
-        """Figures of the chosen features (F,)."""
-        return Figures(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def stands(self, method: int) -> bool:
         """Whether coverage stands for itself, if these are of one station."""
@@ -83,19 +70,19 @@ class Figures:
         """Share of the scatter in the 95 % ellipses; windows are what errors are independent between."""
         return share(*self._by(self.window, method).T)
 
+    def stations(self) -> dict[int, "Figures"]:
+        """Figures of each station by its number."""
+        return {number: self[self.station == number] for number in np.unique(self.station).tolist()}
+
     def by_station(self, method: int) -> dict[int, tuple[float, int]]:
         """Coverage and number of sightings of each station that saw a feature."""
-        numbers = np.unique(self.station).tolist()
-        sums = self._by(self.station, method).tolist()
-        return {number: (hits / n, int(n)) for number, (hits, n) in zip(numbers, sums, strict=True) if n}
+        sums = zip(self.stations(), self._by(self.station, method).tolist(), strict=True)
+        return {number: (hits / n, int(n)) for number, (hits, n) in sums if n}
 
     def extremes(self, method: int) -> tuple[float, float] | None:
         """Coverage of the lowest and the highest station of those that stand for themselves; None if there are none."""
-        shares = [
-            held
-            for number, (held, _) in self.by_station(method).items()
-            if self[self.station == number].stands(method)
-        ]
+        held, stations = self.by_station(method), self.stations()
+        shares = [share for number, (share, _) in held.items() if stations[number].stands(method)]
         return (min(shares), max(shares)) if shares else None
 
     def area_ratio(self, method: int) -> Interval:
@@ -117,7 +104,7 @@ class Figures:
         """Windows are what errors are independent between, and Student's t knows how few they are."""
         seen = np.isfinite(logs)
         if not seen.any():
-            return Interval(np.nan, np.nan, np.nan)
+            return UNKNOWN
         weights = self.counts[seen, method]
         mean = float(np.average(logs[seen], weights=weights))
         window = np.unique(self.window[seen], return_inverse=True)[1]
@@ -188,7 +175,7 @@ def study(
         raise EvaluationError(
             f"There is no station to judge: the sensor should stand still for {SHORTEST} scans at least."
         )
-    return StationStudy(tuple(methods), tuple(judged), Figures.together(walls), Figures.together(corners))
+    return StationStudy(tuple(methods), tuple(judged), Figures.joined(walls), Figures.joined(corners))
 
 
 def _calibrated(station: Station, scans: Sequence[Scan]) -> Station:

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from lidarcore import files
-from lidarcore.evaluation.repeatability.tables import json_text
 from lidarcore.evaluation.stations.study import Figures, StationStudy
+from lidarcore.files.texts import json_text
 
 
 def write(study: StationStudy, path: Path) -> None:

@@ -9,14 +9,22 @@ from numpy.typing import ArrayLike
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
 from lidarcore.files import replacing_all
-from lidarcore.mapping.export.picture import map_png
-from lidarcore.mapping.export.plan import plan_dxf, plan_svg
+from lidarcore.mapping.export.drawings import map_png, plan_dxf, plan_svg
 from lidarcore.mapping.export.tables import walls_csv, walls_geojson
 from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.grid.ros_map import ros_yaml, write_pgm
+from lidarcore.mapping.grid.ros_map import ros_pgm, ros_yaml
 from lidarcore.mapping.walls import Walls
 
-Writer = Callable[[OccupancyGrid, Walls, Array, Path], None]
+MAP_FILES: dict[str, Callable[[OccupancyGrid, Walls, Array], bytes]] = {
+    "map.pgm": lambda grid, walls, path: ros_pgm(grid),
+    "map.yaml": lambda grid, walls, path: ros_yaml(grid, "map.pgm").encode(),
+    "walls.csv": lambda grid, walls, path: walls_csv(walls).encode(),
+    "walls.geojson": lambda grid, walls, path: walls_geojson(walls).encode(),
+    "plan.svg": lambda grid, walls, path: plan_svg(walls, path).encode(),
+    "plan.dxf": lambda grid, walls, path: plan_dxf(walls, path).encode(),
+    "map.png": map_png,
+}
+"""The files of a map by name, and what makes each of grid, walls and the path (T, 2) m of the sensor."""
 
 
 def write_map(
@@ -40,52 +48,11 @@ def write_map(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with replacing_all(*(folder / name for name in (*MAP_FILES, *texts))) as parts:
-            for write, part in zip(MAP_FILES.values(), parts, strict=False):
-                write(grid, walls, way, part)
+            for content_of, part in zip(MAP_FILES.values(), parts, strict=False):
+                part.write_bytes(content_of(grid, walls, way))
             for text, part in zip(texts.values(), parts[len(MAP_FILES) :], strict=True):
                 part.write_text(text, "utf-8", newline="")
     except OSError as error:
         if made and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
         raise MapFileError(f"The map cannot be written to {folder}: {error}.") from error
-
-
-def _pgm(grid: OccupancyGrid, walls: Walls, path: Array, file: Path) -> None:
-    write_pgm(grid, file)
-
-
-def _yaml(grid: OccupancyGrid, walls: Walls, path: Array, file: Path) -> None:
-    file.write_text(ros_yaml(grid, "map.pgm"), "utf-8")
-
-
-def _csv(grid: OccupancyGrid, walls: Walls, path: Array, file: Path) -> None:
-    file.write_text(walls_csv(walls), "utf-8", newline="")
-
-
-def _geojson(grid: OccupancyGrid, walls: Walls, path: Array, file: Path) -> None:
-    file.write_text(walls_geojson(walls), "utf-8", newline="")
-
-
-def _svg(grid: OccupancyGrid, walls: Walls, path: Array, file: Path) -> None:
-    file.write_text(plan_svg(walls, path), "utf-8", newline="")
-
-
-def _dxf(grid: OccupancyGrid, walls: Walls, path: Array, file: Path) -> None:
-    file.write_text(plan_dxf(walls, path), "utf-8")
-
-
-def _png(grid: OccupancyGrid, walls: Walls, path: Array, file: Path) -> None:
-    with file.open("wb") as stream:
-        map_png(grid, walls, path, stream)
-
-
-MAP_FILES: dict[str, Writer] = {
-    "map.pgm": _pgm,
-    "map.yaml": _yaml,
-    "walls.csv": _csv,
-    "walls.geojson": _geojson,
-    "plan.svg": _svg,
-    "plan.dxf": _dxf,
-    "map.png": _png,
-}
-"""The files of a map by name, and what writes each."""

@@ -1,25 +1,24 @@
 """Walls as CSV and GeoJSON: metres, radians, seconds, and saying so."""
 
-import csv
-import io
-import json
 from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from lidarcore.files.texts import csv_text, json_lines
 from lidarcore.mapping.walls import Walls, WallTable
 
 Row = dict[str, Any]
 
+_COLUMNS = (
+    "id", "alpha_rad", "r_m", "x1_m", "y1_m", "x2_m", "y2_m", "length_m", "var_alpha_rad2", "cov_alpha_r_rad_m",
+    "var_r_m2", "var_length_m2", "ended_1", "ended_2", "corner_1", "corner_2", "first_seen_s", "last_seen_s", "count",
+)  # fmt: skip
+
 
 def walls_csv(walls: WallTable, chosen: Iterable[int] | None = None) -> str:
     """A line for each wall, or each chosen one; where it may go on beyond an end, `ended` is 0, `length` the least."""
-    text = io.StringIO()
-    writer = csv.DictWriter(text, [*_row(None, 0)], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(_row(walls, i) for i in (range(len(walls)) if chosen is None else chosen))
-    return text.getvalue()
+    return csv_text((_row(walls, i) for i in (range(len(walls)) if chosen is None else chosen)), _COLUMNS)
 
 
 def walls_geojson(walls: WallTable, chosen: Iterable[int] | None = None) -> str:
@@ -30,31 +29,18 @@ def walls_geojson(walls: WallTable, chosen: Iterable[int] | None = None) -> str:
         corners = walls.corners.walls.tolist()
         features += [_corner_feature(walls, k) for k, pair in enumerate(corners) if set(pair) <= kept.keys()]
     head = {"type": "FeatureCollection", "format": "lidarcore walls", "version": 1, "unit": "m"}
-    lines = ",\n".join(json.dumps(feature, allow_nan=False) for feature in features)
-    return f'{json.dumps(head)[:-1]}, "features": [\n{lines}\n]}}\n'
+    return "".join(json_lines(head, "features", features))
 
 
-def _row(walls: WallTable | None, i: int) -> Row:
-    """What a file says of a wall; the names alone without walls."""
-    names = (
-        "id", "alpha_rad", "r_m", "x1_m", "y1_m", "x2_m", "y2_m", "length_m", "var_alpha_rad2", "cov_alpha_r_rad_m",
-        "var_r_m2", "var_length_m2", "ended_1", "ended_2", "corner_1", "corner_2", "first_seen_s", "last_seen_s",
-        "count",
-    )  # fmt: skip
-    if walls is None:
-        return dict.fromkeys(names)
+def _row(walls: WallTable, i: int) -> Row:
+    """What a file says of a wall."""
     C = walls.line_covariance[i]
     numbers = [walls.alpha[i], walls.r[i], *walls.ends[i].ravel(), walls.length[i]]
     numbers += [C[0, 0], C[0, 1], C[1, 1], walls.length_variance[i]]
     flags = np.concatenate([walls.ended[i], walls.in_corner[i]]).astype(int).tolist()
     seen = [float(walls.first_seen[i]), float(walls.last_seen[i]), int(walls.count[i])]
-    return dict(
-        zip(
-            names,
-            [int(walls.ids[i]), *(float(f"{value:.9g}") for value in numbers), *flags, *seen],
-            strict=True,
-        )
-    )
+    values = [int(walls.ids[i]), *(float(f"{value:.9g}") for value in numbers), *flags, *seen]
+    return dict(zip(_COLUMNS, values, strict=True))
 
 
 def _wall_feature(walls: WallTable, i: int) -> Row:

@@ -67,10 +67,8 @@ class GridBuilder:
 
     def _make_room(self, points: Array) -> None:
         """Grow, if need be, to hold points (N, 2) in cells."""
-        low, high = (
-            np.floor(points.min(axis=0)).astype(np.int64),
-            np.floor(points.max(axis=0)).astype(np.int64) + 1,
-        )
+        low = np.floor(points.min(axis=0)).astype(np.int64)
+        high = np.floor(points.max(axis=0)).astype(np.int64) + 1
         before_low, before_high = self._low, self._low + self._odds.shape[::-1]
         if self._odds.size:
             if (low >= before_low).all() and (high <= before_high).all():

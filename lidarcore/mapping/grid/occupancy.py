@@ -67,13 +67,11 @@ class OccupancyGrid:
 
     def in_cells(self, xy: Array) -> Array:
         """Columns and rows (N, 2), with fractions, of points (N, 2) m in the world, from the grid's first corner."""
-        placed: Array = act_inverse(self.origin, xy) / self.resolution
-        return placed
+        return act_inverse(self.origin, xy) / self.resolution
 
     def cells_of(self, xy: Array) -> Ints:
         """Row and column (N, 2) of points (N, 2) m in the world, which may lie outside of the grid."""
-        cells: Ints = np.floor(self.in_cells(xy)[:, ::-1]).astype(np.int64)
-        return cells
+        return np.floor(self.in_cells(xy)[:, ::-1]).astype(np.int64)
 
     def at(self, xy: Array) -> Cells:
         """Cells (N,) at points (N, 2) m in the world; what lies outside is unknown."""

@@ -1,5 +1,6 @@
 """Occupancy grids as ROS keeps them: an image, and beside it a YAML file that places it (Nav2 map_server)."""
 
+import re
 from collections.abc import Callable
 from functools import reduce
 from pathlib import Path
@@ -23,6 +24,7 @@ _MOST_PIXELS = 100_000_000
 _BYTES_OF_MEMORY = 70_000_000  # that an image may take beside four times the size of its file
 _BAND = 1 << 17  # pixels that are looked at together
 _OPAQUE = 255
+_PGM_HEADER = re.compile(rb"P5(?:\s+(?:#[^\n]*\n\s*)*\d+){3}\s")  # of a binary one, up to the pixels
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
@@ -74,16 +76,16 @@ def write_ros_map(grid: OccupancyGrid, path: str | Path) -> None:
     image = path.with_suffix(".pgm")
     try:
         with replacing_all(image, path) as (image_part, yaml_part):
-            write_pgm(grid, image_part)
+            image_part.write_bytes(ros_pgm(grid))
             yaml_part.write_text(ros_yaml(grid, image.name), "utf-8")
     except OSError as error:
         raise MapFileError(f"{path} cannot be written: {error}.") from error
 
 
-def write_pgm(grid: OccupancyGrid, path: Path) -> None:
-    """Write the image alone. Raises OSError."""
+def ros_pgm(grid: OccupancyGrid) -> bytes:
+    """The image alone."""
     height, width = grid.cells.shape
-    path.write_bytes(b"P5\n%d %d\n255\n" % (width, height) + shades_of(grid).tobytes())
+    return b"P5\n%d %d\n255\n" % (width, height) + shades_of(grid).tobytes()
 
 
 def shades_of(grid: OccupancyGrid) -> NDArray[np.uint8]:
@@ -171,28 +173,12 @@ def _check_size(path: Path, width: int, height: int, bytes_each: int) -> None:
 def _check_length(path: Path, width: int, height: int, is_deep: bool) -> None:
     """Raise MapFileError if a binary PGM holds less or more than the pixels it announces."""
     with path.open("rb") as file:
-        head, size = file.read(1000), path.stat().st_size
-    if not head.startswith(b"P5"):
-        return
+        header = _PGM_HEADER.match(file.read(1000))
     wanted = width * height * (2 if is_deep else 1)
-    header = _header_length(head)
-    if size != header + wanted:
+    if header and (held := path.stat().st_size - header.end()) != wanted:
         raise MapFileError(
-            f"{path.name} says {width} x {height} pixels, which take {wanted} bytes, but holds {size - header}."
+            f"{path.name} says {width} x {height} pixels, which take {wanted} bytes, but holds {held}."
         )
-
-
-def _header_length(head: bytes) -> int:
-    """Bytes before the pixels: three numbers, comments among them, and one space after the last."""
-    at, numbers = 2, 0
-    while numbers < 3:
-        while head[at : at + 1].isspace():
-            at += 1
-        comment = head[at : at + 1] == b"#"
-        while at < len(head) and not (head[at : at + 1] == b"\n" if comment else head[at : at + 1].isspace()):
-            at += 1
-        numbers += not comment
-    return at + 1
 
 
 def _trinary(shades: Array, opacity: Array, header: _Header) -> Cells:

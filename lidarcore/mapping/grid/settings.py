@@ -1,14 +1,9 @@
 """What can be set about occupancy grids."""
 
-from typing import Annotated
-
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
-
-from lidarcore.fields import number
+from lidarcore.fields import number, settings, whole
 
 
-@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+@settings
 class GridSettings:
     """How rays become cells. Evidence is kept in log-odds between two bounds, so that a map can change its mind.
 
@@ -28,6 +23,4 @@ class GridSettings:
     most: float = number(0.1, 6.0, "", "bound of the log-odds of an occupied cell", default=3.5)
     least: float = number(0.1, 6.0, "", "bound of the log-odds of a free cell, below zero", default=2.0)
     max_range: float = number(0.5, 1000.0, "m", "returns from farther away are left out", default=80.0)
-    most_cells: Annotated[
-        int, Field(ge=1, le=1_000_000_000, description="a grid that would need more is refused")
-    ] = 100_000_000
+    most_cells: int = whole(1, 1_000_000_000, "a grid that would need more is refused", default=100_000_000)

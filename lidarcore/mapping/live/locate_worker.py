@@ -1,7 +1,6 @@
 """Where keyframes lie in a known map, in a thread of its own: a scan never waits for a search."""
 
 from collections import deque
-from typing import Literal
 
 import numpy as np
 
@@ -9,7 +8,7 @@ from lidarcore.arrays import Array
 from lidarcore.errors import LocalizationError
 from lidarcore.geometry import UncertainPose, compose, largest_variance
 from lidarcore.localization.tracking_result import State
-from lidarcore.mapping.live.background import END_WITHIN, Corrected, MapPicture
+from lidarcore.mapping.live.background import Background, Corrected, MapPicture
 from lidarcore.mapping.live.worker import Worker
 from lidarcore.mapping.relocation import Relocation, Relocator, Verdict, query_of
 from lidarcore.mapping.settings import VAGUE
@@ -19,6 +18,7 @@ from lidarcore.threads import FailureLog
 
 _TOGETHER = 6  # keyframes that are looked for together
 _MISSES = 3  # keyframes in a row that the map contradicts, after which the pose is not believed
+_PATH = 10_000  # keyframes of which is kept where they lie: some kilometres
 _LOST = 1.0  # m of standard deviation beyond which a predicted pose is none
 _NOWHERE = UncertainPose(np.zeros(3), np.diag([10.0, 10.0, np.pi]) ** 2)
 
@@ -33,8 +33,8 @@ _WHY_NOT: dict[Verdict, str] = {
 }
 
 
-class LocateWorker:
-    """Takes keyframes and says where they lie; `corrected` is replaced whole, and may be read from any thread.
+class LocateWorker(Background):
+    """Takes keyframes and says where they lie in a map that is known.
 
     A pose is believed once a search of the whole map has one answer, and the map still agrees a metre further on: where
     rooms look alike and one of them is not in the map, a single view is mistaken for the other. From there on it is
@@ -47,14 +47,14 @@ class LocateWorker:
     background  whether searches run in a thread of their own; otherwise `put` waits for them
     """
 
-    mode: Literal["slam", "localize"] = "localize"
+    mode = "localize"
 
     def __init__(self, picture: MapPicture, drift: Array, background: bool) -> None:
-        self.picture, self._drift = picture, drift
-        self.corrected = Corrected(np.zeros((1, 3)), _NOWHERE.covariance)
+        self.picture, self._grid, self._drift = picture, picture.grid, drift
+        self.corrected = Corrected(1, np.zeros((1, 3)), _NOWHERE.covariance)
         self._relocator: Relocator | None = None
         self._here, self._local = _NOWHERE, np.zeros(3)  # T_map_keyframe, T_local_keyframe
-        self._poses: list[Array] = []
+        self._keyframes, self._poses = 0, deque[Array](maxlen=_PATH)
         self._recent: deque[tuple[Scan, Array]] = deque(maxlen=_TOGETHER)  # and T_local_keyframe
         self._verdict: tuple[State, str | None] = "starting", None
         self._misses = 0
@@ -62,40 +62,15 @@ class LocateWorker:
         self._failures = FailureLog("a keyframe could not be found in the map")
         self._worker = Worker(self._work, "locate") if background else None
 
-    @property
-    def is_behind(self) -> bool:
-        """Whether keyframes wait."""
-        return self._worker is not None and self._worker.is_behind
-
-    def put(self, tracked: Tracked) -> None:
-        """Go on by a keyframe. Without a thread, raises LocalizationError if nothing can be found in this map."""
-        self._hand_over(tracked)
-
     def place(self, T_map_keyframe: UncertainPose) -> None:
         """Go on from a pose of the last keyframe, or of the first one to come, that someone has told."""
-        self._hand_over(T_map_keyframe)
-
-    def _hand_over(self, item: Tracked | UncertainPose) -> None:
-        if self._worker is None:
-            self._step(item, 0)
-        else:
-            self._worker.put(item)
+        self.put(T_map_keyframe)
 
     def judge(self, tracked: Tracked, here: UncertainPose) -> tuple[State, str | None]:
         """Whether the pose of a scan is to be believed, and what is to be said about that."""
         if tracked.on or self._verdict[0] != "tracking":
             return self._verdict
         return "coasting", _NOT_SEEN
-
-    def end(self) -> None:
-        """Take no more keyframes; returns at once."""
-        if self._worker is not None:
-            self._worker.end()
-
-    def close(self) -> None:
-        """End, and wait for it."""
-        if self._worker is not None:
-            self._worker.close(END_WITHIN)
 
     def _work(self, item: Tracked | UncertainPose | None, waiting: int) -> None:
         if item is None:
@@ -115,7 +90,7 @@ class LocateWorker:
         if self._recent:
             self._look(waiting)
             self._poses[-1] = self._here.pose
-            self.corrected = Corrected(np.array(self._poses), self._here.covariance)
+            self.corrected = Corrected(self._keyframes, np.array(self._poses), self._here.covariance)
 
     def _go_on(self, tracked: Tracked) -> None:
         """Go on to the next keyframe, by the front end alone."""
@@ -128,11 +103,12 @@ class LocateWorker:
             self._lose()
         self._recent.append((tracked.scan, self._local))
         self._poses.append(self._here.pose)
+        self._keyframes += 1
 
     def _look(self, waiting: int) -> None:
         """Compare the last keyframes with the map: near the pose if there is one, else everywhere."""
         if self._relocator is None:
-            self._relocator = Relocator(self.picture.grid)
+            self._relocator = Relocator(self._grid)
         scans, poses = zip(*self._recent, strict=True)
         query = query_of(scans, np.array(poses))
         state = self._verdict[0]

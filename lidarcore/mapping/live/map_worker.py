@@ -3,7 +3,6 @@
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from lidarcore.errors import GridError, LocalizationError
 from lidarcore.geometry import UncertainPose, pose_difference
 from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
-from lidarcore.mapping.live.background import END_WITHIN, Corrected, MapPicture
+from lidarcore.mapping.live.background import Background, Corrected, MapPicture
 from lidarcore.mapping.live.worker import Worker
 from lidarcore.mapping.loops.back import BackEnd
 from lidarcore.mapping.settings import VAGUE, MapperSettings
@@ -33,13 +32,13 @@ _ISLAND = (
 _NOT_PLACED = "A map of whole scans begins where its first scan was taken and cannot be moved."
 
 
-class MapWorker:
-    """Takes keyframes; `corrected` and `picture` are replaced whole, and may be read from any thread.
+class MapWorker(Background):
+    """Takes keyframes and makes a map of them.
 
     keep  called with grid and walls, in the thread of the map, each time that walls were found
     """
 
-    mode: Literal["slam", "localize"] = "slam"
+    mode = "slam"
 
     def __init__(
         self,
@@ -48,24 +47,15 @@ class MapWorker:
         keep: Callable[[OccupancyGrid, Walls], None] | None = None,
     ) -> None:
         self._keep = keep
-        self.corrected = Corrected(np.zeros((1, 3)), np.zeros((3, 3)))
-        self.picture: MapPicture | None = None
+        self.corrected = Corrected(1, np.zeros((1, 3)), np.zeros((3, 3)))
+        self.picture = None
         self._extraction = extraction
         self._back = BackEnd(settings)
         self._begin_grid(GridSettings(most_cells=_MOST_CELLS))
         self._wall_ids = WallIds()
         self._next_picture = self._next_walls = 0.0
         self._failures = FailureLog("the map could not be brought up to date")
-        self._worker: Worker[Tracked] = Worker(self._work, "map", idle=_EVERY)
-
-    @property
-    def is_behind(self) -> bool:
-        """Whether keyframes wait."""
-        return self._worker.is_behind
-
-    def put(self, tracked: Tracked) -> None:
-        """Add a keyframe; returns at once."""
-        self._worker.put(tracked)
+        self._worker = Worker(self._work, "map", idle=_EVERY)
 
     def place(self, T_map_keyframe: UncertainPose) -> None:
         """Raises LocalizationError: the map begins at its first scan, and cannot be moved."""
@@ -77,19 +67,11 @@ class MapWorker:
             return "lost", _ISLAND
         return ("tracking", None) if tracked.on else ("lost", _NOT_CONNECTED)
 
-    def end(self) -> None:
-        """Take no more keyframes; returns at once."""
-        self._worker.end()
-
-    def close(self) -> None:
-        """End, and wait for it."""
-        self._worker.close(END_WITHIN)
-
-    def _work(self, tracked: Tracked | None, _: int) -> None:
+    def _work(self, tracked: Tracked | None, waiting: int) -> None:
         with self._failures():
-            self._step(tracked)
+            self._step(tracked, waiting)
 
-    def _step(self, tracked: Tracked | None) -> None:
+    def _step(self, tracked: Tracked | None, waiting: int) -> None:
         if tracked is not None:
             self._add(tracked)
         lacks = self._back.keyframes and len(self._drawn) < len(self._back.graph)
@@ -99,7 +81,7 @@ class MapWorker:
     def _add(self, tracked: Tracked) -> None:
         self._back.add(tracked)
         graph = self._back.graph
-        self.corrected = Corrected(graph.poses, graph.covariance(len(graph) - 1))
+        self.corrected = Corrected(len(graph), graph.poses, graph.covariance(len(graph) - 1))
         if len(graph) % _THINNED_EVERY == 0:
             self._back.thin()
         if tracked.first is not None:

@@ -1,6 +1,8 @@
 """The pose from whole scans: each one is matched to the last keyframes at once, and the map behind catches up."""
 
+from collections import deque
 from collections.abc import Callable
+from itertools import islice
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,7 +11,7 @@ from lidarcore.arrays import Array
 from lidarcore.clusters import Clusters
 from lidarcore.errors import MotionError
 from lidarcore.features import Features
-from lidarcore.geometry import UncertainPose, check_covariance, inverse, relative
+from lidarcore.geometry import UncertainPose, as_pose_covariance, inverse, relative
 from lidarcore.localization import Estimate, Landmarks, Points, TrackingResult, Velocity, as_pose
 from lidarcore.localization.dead_reckoning import DeadReckoning
 from lidarcore.localization.deskewing import Distortion
@@ -60,8 +62,6 @@ class WholeScans:
         self._extraction = extraction = extraction or ExtractionSettings()
         self._settings = MapperSettings().with_noise(extraction.noise)
         self._distortion, self._reckoning = Distortion(), DeadReckoning()
-        self._before: float | None = None  # stamp of the last scan
-        self._velocity: Velocity | None = None
         self._is_nowhere = False  # in a known map, as long as the pose was not found
         self._begin()
 
@@ -81,7 +81,10 @@ class WholeScans:
         return self._background.is_behind
 
     def path(self) -> Array:
-        """(T, 2) m: where the keyframes were taken, as the map has them now, and the newest scan."""
+        """(T, 2) m: where the keyframes were taken, as the map has them now, and the newest scan.
+
+        In a known map the last kilometres of a long drive.
+        """
         known = self._background.corrected
         newer = [pose.pose[:2] for pose in self._chain(known)[1:]]
         here = [] if self._here is None else [self._here.pose[:2]]
@@ -93,8 +96,7 @@ class WholeScans:
         Raises LocalizationError if the pose is not finite or the map is built, CovarianceError if the covariance is not
         positive definite.
         """
-        check_covariance(covariance, "The pose's covariance")
-        told = UncertainPose(as_pose(pose, "pose"), np.asarray(covariance, np.float64))
+        told = UncertainPose(as_pose(pose, "pose"), as_pose_covariance(covariance, "The pose's covariance"))
         self._background.place(told.compose(UncertainPose(inverse(self._tie.pose), np.zeros((3, 3)))))
 
     def deskewed(self, scan: Scan) -> Scan:
@@ -136,11 +138,13 @@ class WholeScans:
     def _begin(self) -> None:
         self._front = FrontEnd(self._settings.front)
         self._background = self._begun()
-        self._ways: list[UncertainPose] = []  # to each keyframe from the one before it
+        # To each keyframe from the one before it, but for those that the map has already, so many.
+        self._ways, self._joined = deque[UncertainPose](), 0
         self._tie = _HERE  # T_keyframe_sensor
         self._here: UncertainPose | None = None
         self._is_nowhere = False
-        self._before = self._velocity = None
+        self._before: float | None = None  # stamp of the last scan
+        self._velocity: Velocity | None = None
 
     def _begun(self) -> Background:
         if self._known is not None:
@@ -155,13 +159,17 @@ class WholeScans:
             self._background.put(tracked)
             tie = _HERE
         self._tie = tie
-        self._here = self._chain(self._background.corrected)[-1].compose(tie)
+        known = self._background.corrected
+        while self._ways and self._joined < known.keyframes:
+            self._ways.popleft()
+            self._joined += 1
+        self._here = self._chain(known)[-1].compose(tie)
         return self._here
 
     def _chain(self, known: Corrected) -> list[UncertainPose]:
         """Poses of the last keyframe that the map has, and of those since."""
         poses = [UncertainPose(known.poses[-1], known.covariance)]
-        for way in self._ways[len(known.poses) :]:
+        for way in islice(self._ways, max(known.keyframes - self._joined, 0), None):
             poses.append(poses[-1].compose(way))
         return poses
 

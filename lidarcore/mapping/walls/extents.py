@@ -9,9 +9,8 @@ from lidarcore.mapping.walls.pieces import Pieces
 from lidarcore.mapping.walls.settings import WallSettings
 
 _STEP = 0.01  # m between the points at which the grid is asked
-_SOLID = (
-    0.8  # share of a stretch that must stand: small holes are the grid's, many of them a wall's that is gone
-)
+# Share of a stretch that must stand: small holes are the grid's, many of them a wall's that is gone.
+_SOLID = 0.8
 _BAND = 1.0  # cells to both sides within which what stands there is the wall
 
 
@@ -30,8 +29,7 @@ def stretches(pieces: Pieces, members: Ints, fit: Fit, grid: OccupancyGrid, sett
     first, last = np.append(0, breaks + 1), np.append(breaks, len(there) - 1)
     found = np.stack([there[first], there[last]], -1)
     stands = (last - first + 1) * _STEP >= _SOLID * (found[:, 1] - found[:, 0])
-    result: Array = found[stands]
-    return result
+    return found[stands]
 
 
 def _covered(at: Array, t: Array) -> Mask:
@@ -39,8 +37,7 @@ def _covered(at: Array, t: Array) -> Mask:
     starts, ends = np.sort(t.min(axis=1)), np.sort(t.max(axis=1))
     begun = np.searchsorted(starts, at + _STEP, "right")
     done = np.searchsorted(ends, at - _STEP, "left")
-    covered: Mask = begun > done
-    return covered
+    return begun > done
 
 
 def _ask(grid: OccupancyGrid, fit: Fit, at: Array) -> tuple[Mask, Mask]:

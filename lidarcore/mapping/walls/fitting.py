@@ -24,14 +24,12 @@ class Fit:
 
     noise  (2, 2) of the angle and of the distance along the normal at the centre: by the sensor's noise alone
     gain   (N, 2, 3) how both follow the poses of the N segments' keyframes
-    share  (N,) weight of each segment, adding up to one
     """
 
     centre: Array
     alpha: float
     noise: Array
     gain: Array
-    share: Array
 
     @property
     def normal(self) -> Array:
@@ -65,7 +63,7 @@ def fit_line(pieces: Pieces, members: Ints) -> Fit:
     turn, shift = (gains @ np.stack([angle, offset], -1)[..., None]).sum(axis=0)[:, 0]
     total = (gains @ noise @ gains.swapaxes(1, 2)).sum(axis=0)
     moved = centre + shift * unit_vectors(alpha)
-    return Fit(moved, float(wrap(alpha + turn)), total, gains @ from_pose, gains[:, 1, 1])
+    return Fit(moved, float(wrap(alpha + turn)), total, gains @ from_pose)
 
 
 def _scatter(ends: Array, centre: Array, alpha: float) -> Array:

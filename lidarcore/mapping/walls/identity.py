@@ -42,7 +42,7 @@ class WallIds:
         new = np.flatnonzero(ids < 0)
         ids[new] = self._next + np.arange(len(new))
         self._next += len(new)
-        kept = self._known.where(np.isin(self._known.wall, known[~tied.any(axis=1)]))
+        kept = self._known[np.isin(self._known.wall, known[~tied.any(axis=1)])]
         self._known = Observations.joined([kept, walls.observations.renamed(ids)])
         self._last = replace(walls, ids=ids)
         return self._last
@@ -51,10 +51,9 @@ class WallIds:
 def _same(before: Observations, now: Observations, shape: tuple[int, int]) -> Mask:
     """Which walls before and now (B, N) have most of either in common, as far as both could see it."""
     shared = common(before, now, shape).toarray()
-    then = now.where(now.segment <= before.segment.max(initial=-1))
+    then = now[now.segment <= before.segment.max(initial=-1)]
     of_before, of_now = before.lengths(shape[0])[:, None], then.lengths(shape[1])
-    same: Mask = (shared > 0) & ((shared >= _MOST * of_before) | (shared >= _MOST * of_now))
-    return same
+    return (shared > 0) & ((shared >= _MOST * of_before) | (shared >= _MOST * of_now))
 
 
 def _beside(before: Walls, now: Walls) -> Mask:
@@ -67,5 +66,4 @@ def _beside(before: Walls, now: Walls) -> Mask:
     shared = np.minimum(t[..., 1], now.length) - np.maximum(t[..., 0], 0)
     shorter = np.minimum(before.length[:, None], now.length)
     alike = way_before @ along.T > _ALIKE * before.length[:, None]
-    beside: Mask = alike & (off < _BESIDE) & (shared > _MOST * shorter)
-    return beside
+    return alike & (off < _BESIDE) & (shared > _MOST * shorter)

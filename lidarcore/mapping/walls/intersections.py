@@ -30,10 +30,8 @@ def find_intersections(parts: list[Part], settings: WallSettings) -> Intersectio
     if not parts:
         return Intersections(np.empty((0, 2), np.int64), np.empty(0, np.int64), np.empty((0, 2)))
     centre = np.stack([part.fit.centre for part in parts])
-    normal, along = (
-        np.stack([part.fit.normal for part in parts]),
-        np.stack([part.fit.along for part in parts]),
-    )
+    normal = np.stack([part.fit.normal for part in parts])
+    along = np.stack([part.fit.along for part in parts])
     spans = np.array([[part.low, part.high] for part in parts])
     found = []
     for i, part in enumerate(parts):

@@ -4,12 +4,14 @@ Four numbers are estimated for each wall: the angle of its normal, its distance 
 where it begins and ends along the line, if that was seen. An end in a corner follows from the lines of two walls.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.sparse import block_diag, coo_array, csr_array
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array
 from lidarcore.mapping.walls.ends import End
 from lidarcore.mapping.walls.intersections import Intersections
 from lidarcore.mapping.walls.parts import Part
@@ -59,10 +61,7 @@ class WallModel:
             blocks = full.reshape(count, size, count, size)
             found.append(blocks[np.arange(count), :, np.arange(count)])
         C = np.concatenate(found)
-        symmetric: Array = (
-            C + C.swapaxes(1, 2)
-        ) / 2  # rounding leaves the two halves apart, and only one is stored
-        return symmetric
+        return (C + C.swapaxes(1, 2)) / 2  # rounding leaves the two halves apart, and only one is stored
 
     def ends_of(self, *walls: int) -> csr_array:
         """Rows (4 N, 4 W): x and y of both ends of walls, one after the other."""
@@ -80,22 +79,39 @@ def wall_model(
 ) -> WallModel:
     """A model of walls with their own ends, those in corners replaced; systematic (m) is that of SensorNoise."""
     blocks = [_noise(part, pair, systematic) for part, pair in zip(parts, ends, strict=True)]
-    rows = _line_rows(parts) + _end_rows(parts, ends, intersections)
     noise = csr_array(block_diag(blocks, format="csr")) if blocks else csr_array((0, 0))
-    return WallModel(rows, _gain(pieces, parts, ends, keyframes), noise, spread)
+    rows, gain = _rows(parts, ends, intersections), _gain(pieces, parts, ends, keyframes)
+    return WallModel(rows, gain, noise, spread)
 
 
 def corner_rows(parts: list[Part], i: int, j: int, xy: Array) -> csr_array:
     """Rows (2, 4 W): x and y of the point where the lines of walls i and j meet."""
-    fits = parts[i].fit, parts[j].fit
-    N = np.stack([fit.normal for fit in fits])
-    # A line moves at xy by its distance's change, less its turn times the way from its centre.
-    lines = np.zeros((2, 4))
-    lines[0, :2] = -((xy - fits[0].centre) @ fits[0].along), 1.0
-    lines[1, 2:] = -((xy - fits[1].centre) @ fits[1].along), 1.0
-    moved: Array = np.linalg.solve(N, lines).astype(np.float64)
-    columns = np.array([_STATE * i, _STATE * i + 1, _STATE * j, _STATE * j + 1])
-    return _sparse(moved, np.arange(2), columns, (2, _STATE * len(parts)))
+    entries = _Entries()
+    _add_corner(entries, [0, 1], parts, i, j, xy)
+    return entries.matrix(2, _STATE * len(parts))
+
+
+class _Entries:
+    """A sparse matrix that is put together block by block; where blocks overlap, they add up."""
+
+    def __init__(self) -> None:
+        self._blocks, self._rows, self._columns = (
+            [np.empty(0)],
+            [np.empty(0, np.int64)],
+            [np.empty(0, np.int64)],
+        )
+
+    def add(self, block: Array, rows: Sequence[int], columns: ArrayLike) -> None:
+        """Add a block (R, C) at these rows (R,) and columns (C,)."""
+        row, column = np.meshgrid(rows, columns, indexing="ij")
+        self._blocks.append(block.ravel())
+        self._rows.append(row.ravel())
+        self._columns.append(column.ravel())
+
+    def matrix(self, rows: int, columns: int) -> csr_array:
+        """The matrix (rows, columns)."""
+        places = np.concatenate(self._rows), np.concatenate(self._columns)
+        return csr_array(coo_array((np.concatenate(self._blocks), places), shape=(rows, columns)))
 
 
 def _noise(part: Part, ends: tuple[End, End], systematic: float) -> Array:
@@ -107,63 +123,46 @@ def _noise(part: Part, ends: tuple[End, End], systematic: float) -> Array:
 
 
 def _gain(pieces: Pieces, parts: list[Part], ends: list[tuple[End, End]], keyframes: int) -> csr_array:
-    entries, rows, columns = [np.empty(0)], [np.empty(0, np.int64)], [np.empty(0, np.int64)]
+    entries = _Entries()
     for i, (part, pair) in enumerate(zip(parts, ends, strict=True)):
         told = [(part.members, part.fit.gain[:, 0]), (part.members, part.fit.gain[:, 1])]
         told += [(end.members, end.gain) for end in pair]
         for k, (members, gain) in enumerate(told):
-            entries.append(gain.ravel())
-            rows.append(np.full(gain.size, _STATE * i + k))
-            columns.append((3 * pieces.keyframe[members][:, None] + np.arange(3)).ravel())
-    places = np.concatenate(rows), np.concatenate(columns)
-    return csr_array(coo_array((np.concatenate(entries), places), shape=(_STATE * len(parts), 3 * keyframes)))
+            columns = 3 * pieces.keyframe[members][:, None] + np.arange(3)
+            entries.add(gain, [_STATE * i + k], columns.ravel())
+    return entries.matrix(_STATE * len(parts), 3 * keyframes)
 
 
-def _line_rows(parts: list[Part]) -> csr_array:
-    """alpha and r: the distance from the origin changes with the angle by the centre's way along the line."""
-    entries, rows, columns = [], [], []
-    for i, part in enumerate(parts):
-        sign = 1.0 if part.fit.normal @ part.fit.centre >= 0 else -1.0
-        entries += [1.0, sign * float(part.fit.along @ part.fit.centre), sign]
-        rows += [_ROWS * i, _ROWS * i + 1, _ROWS * i + 1]
-        columns += [_STATE * i, _STATE * i, _STATE * i + 1]
-    return csr_array(
-        coo_array(
-            (entries, (rows, columns)), shape=(_ROWS * len(parts), _STATE * len(parts)), dtype=np.float64
-        )
-    )
+def _rows(parts: list[Part], ends: list[tuple[End, End]], intersections: Intersections) -> csr_array:
+    """alpha, r and both ends: r changes with the angle by the centre's way along the line."""
+    entries, corners = _Entries(), intersections
+    met = set(zip(corners.walls[:, 0].tolist(), corners.side.tolist(), strict=True))
+    for i, (part, pair) in enumerate(zip(parts, ends, strict=True)):
+        n, u = part.fit.normal, part.fit.along
+        sign = 1.0 if n @ part.fit.centre >= 0 else -1.0
+        line = np.array([[1.0, 0.0], [sign * (u @ part.fit.centre), sign]])
+        entries.add(line, [_ROWS * i, _ROWS * i + 1], [_STATE * i, _STATE * i + 1])
+        for side, end in enumerate(pair):
+            if (i, side) not in met:
+                moved = np.stack([-end.t * n, n, u], -1)  # by angle, distance and the end itself
+                entries.add(moved, _rows_of_end(i, side), [_STATE * i, _STATE * i + 1, _STATE * i + 2 + side])
+    for (i, j), side, xy in zip(corners.walls.tolist(), corners.side.tolist(), corners.xy, strict=True):
+        _add_corner(entries, _rows_of_end(i, side), parts, i, j, xy)
+    return entries.matrix(_ROWS * len(parts), _STATE * len(parts))
 
 
-def _end_rows(parts: list[Part], ends: list[tuple[End, End]], intersections: Intersections) -> csr_array:
-    shape = (_ROWS * len(parts), _STATE * len(parts))
-    total = csr_array(shape)
-    met = {(int(i), int(side)) for (i, _), side in zip(intersections.walls, intersections.side, strict=True)}
-    data, rows, columns = [], [], []
-    for i, part in enumerate(parts):
-        for side in (0, 1):
-            if (i, side) in met:
-                continue
-            n, u, t = part.fit.normal, part.fit.along, ends[i][side].t
-            moved = np.stack([-t * n, n, u], -1)  # by angle, distance and the end itself
-            row, column = np.meshgrid(
-                _ROWS * i + 2 + 2 * side + np.arange(2),
-                _STATE * i + np.array([0, 1, 2 + side]),
-                indexing="ij",
-            )
-            data.append(moved.ravel())
-            rows.append(row.ravel())
-            columns.append(column.ravel())
-    for (i, j), side, xy in zip(intersections.walls, intersections.side, intersections.xy, strict=True):
-        corner = corner_rows(parts, int(i), int(j), xy).tocoo()
-        data.append(corner.data)
-        rows.append(corner.coords[0] + _ROWS * i + 2 + 2 * side)
-        columns.append(corner.coords[1])
-    if not data:
-        return total
-    places = np.concatenate(rows), np.concatenate(columns)
-    return csr_array(coo_array((np.concatenate(data), places), shape=shape))
+def _rows_of_end(i: int, side: int) -> list[int]:
+    """Rows of x and y of one end of wall i."""
+    return [_ROWS * i + 2 + 2 * side, _ROWS * i + 3 + 2 * side]
 
 
-def _sparse(block: Array, rows: Ints, columns: Ints, shape: tuple[int, int]) -> csr_array:
-    row, column = np.meshgrid(rows, columns, indexing="ij")
-    return csr_array(coo_array((block.ravel(), (row.ravel(), column.ravel())), shape=shape))
+def _add_corner(entries: _Entries, rows: Sequence[int], parts: list[Part], i: int, j: int, xy: Array) -> None:
+    """How x and y of the point where the lines of walls i and j meet follow from both."""
+    fits = parts[i].fit, parts[j].fit
+    N = np.stack([fit.normal for fit in fits])
+    # A line moves at xy by its distance's change, less its turn times the way from its centre.
+    lines = np.zeros((2, 4))
+    lines[0, :2] = -((xy - fits[0].centre) @ fits[0].along), 1.0
+    lines[1, 2:] = -((xy - fits[1].centre) @ fits[1].along), 1.0
+    columns = [_STATE * i, _STATE * i + 1, _STATE * j, _STATE * j + 1]
+    entries.add(np.linalg.solve(N, lines).astype(np.float64), rows, columns)

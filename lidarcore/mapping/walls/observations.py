@@ -9,14 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from lidarcore.arrays import Array, Ints
-from lidarcore.mapping.grid.occupancy import Mask
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.mapping.walls.parts import Part
 from lidarcore.mapping.walls.pieces import Pieces
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Observations:
+class Observations(Columns):
     """N stretches of segments, each seen of one wall.
 
     wall     (N,) which; a segment may have been seen of several, one beside the other
@@ -27,9 +26,6 @@ class Observations:
     wall: Ints
     segment: Ints
     span: Array
-
-    def __len__(self) -> int:
-        return len(self.wall)
 
     @classmethod
     def none(cls) -> "Observations":
@@ -48,27 +44,13 @@ class Observations:
             found.append(cls(np.full(on.sum(), i), part.members[on], span[on]))
         return cls.joined(found)
 
-    @classmethod
-    def joined(cls, several: Sequence["Observations"]) -> "Observations":
-        """The observations of several, one after the other."""
-        return cls(
-            np.concatenate([one.wall for one in several]),
-            np.concatenate([one.segment for one in several]),
-            np.concatenate([one.span for one in several]),
-        )
-
-    def where(self, chosen: Mask) -> "Observations":
-        """The chosen observations (N,)."""
-        return Observations(self.wall[chosen], self.segment[chosen], self.span[chosen])
-
     def renamed(self, names: Ints) -> "Observations":
         """These observations, with names[i] for wall i."""
         return Observations(names[self.wall], self.segment, self.span)
 
     def lengths(self, walls: int) -> Array:
         """How much (W,) m of segments was seen of each of so many walls, each segment for itself."""
-        total: Array = np.bincount(self.wall, np.diff(self.span)[:, 0], walls).astype(np.float64)
-        return total
+        return np.bincount(self.wall, np.diff(self.span)[:, 0], walls).astype(np.float64)
 
 
 def common(before: Observations, now: Observations, shape: tuple[int, int]) -> csr_array:

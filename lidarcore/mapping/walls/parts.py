@@ -17,9 +17,8 @@ _ALIKE = 0.9  # cosine of the angle between surfaces that face one way
 _HALF = 0.5  # share of a segment that lies on a part for it to speak for it
 _HOLE = 0.05  # m along a wall that must be out of sight for something to stand there
 _FOOT = 0.1  # m beside such a hole within which what stands there has its foot
-_BEHIND = (
-    2.5  # times the distance of settings, within which two surfaces that face one way cannot both be there
-)
+# Times the distance of settings, within which two surfaces that face one way cannot both be there.
+_BEHIND = 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)

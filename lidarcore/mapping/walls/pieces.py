@@ -84,8 +84,7 @@ def _beyond(features: Features) -> Array:
         past = (
             (across > 0.1) & (scan.ranges[neighbours] > crossing + _BEHIND) & (step < _NEXT * _median(step))
         )
-    beyond: Array = np.where(past, crossing, np.nan)[..., None] * unit_vectors(bearing)
-    return beyond
+    return np.where(past, crossing, np.nan)[..., None] * unit_vectors(bearing)
 
 
 def _median(steps: Array) -> float:

@@ -14,14 +14,12 @@ def distances(walls: WallTable, point: ArrayLike) -> Array:
     a, along, length = _segments(walls)
     to_point = np.asarray(point, np.float64) - a
     t = np.clip((to_point * along).sum(axis=1), 0, length)
-    nearest: Array = np.hypot(*(to_point - t[:, None] * along).T)
-    return nearest
+    return np.hypot(*(to_point - t[:, None] * along).T)
 
 
 def nearest(walls: WallTable, point: ArrayLike, number: int) -> Ints:
     """Indices of the walls nearest to a point (2,), the nearest first; so many, or all there are."""
-    order: Ints = np.argsort(distances(walls, point), kind="stable")[:number]
-    return order
+    return np.argsort(distances(walls, point), kind="stable")[:number]
 
 
 def in_box(walls: WallTable, low: ArrayLike, high: ArrayLike) -> Mask:
@@ -36,15 +34,13 @@ def in_box(walls: WallTable, low: ArrayLike, high: ArrayLike) -> Mask:
     beside = ((a < low) | (a > high)) & (step == 0)
     enters = np.where(step == 0, 0.0, t[0]).max(axis=1, initial=0.0)
     leaves = np.where(step == 0, 1.0, t[1]).min(axis=1, initial=1.0)
-    inside: Mask = (enters <= leaves) & ~beside.any(axis=1)
-    return inside
+    return (enters <= leaves) & ~beside.any(axis=1)
 
 
 def along(walls: WallTable, direction: float, tolerance: float) -> Mask:
     """Which walls (W,) run in a direction, rad from the x axis, either way, to within a tolerance (rad)."""
     off = np.abs(wrap(2 * (walls.alpha + np.pi / 2 - direction))) / 2
-    parallel: Mask = off <= tolerance
-    return parallel
+    return off <= tolerance
 
 
 def _segments(walls: WallTable) -> tuple[Array, Array, Array]:

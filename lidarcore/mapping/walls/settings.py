@@ -1,14 +1,9 @@
 """What can be set about the walls of a map."""
 
-from typing import Annotated
-
-from pydantic import ConfigDict, Field
-from pydantic.dataclasses import dataclass
-
-from lidarcore.fields import number
+from lidarcore.fields import number, settings, whole
 
 
-@dataclass(config=ConfigDict(extra="forbid"), frozen=True, slots=True, kw_only=True)
+@settings
 class WallSettings:
     """How the segments of many scans become walls."""
 
@@ -30,6 +25,4 @@ class WallSettings:
         0.05, 1.57, "rad", "least angle between walls that make a corner", default=0.35
     )
     min_length: float = number(0.0, 10.0, "m", "shorter walls are left out", default=0.2)
-    min_count: Annotated[
-        int, Field(ge=1, le=1000, description="a wall is seen from at least so many keyframes")
-    ] = 1
+    min_count: int = whole(1, 1000, "a wall is seen from at least so many keyframes", default=1)

@@ -27,8 +27,7 @@ def common_spread(covariances: ArrayLike) -> Spread:
 
     def spread(M: csr_array) -> Array:
         moved = M @ roots
-        covariance: Array = moved @ moved.T
-        return covariance
+        return moved @ moved.T
 
     return spread
 
@@ -42,8 +41,7 @@ def joint_spread(covariance: ArrayLike) -> Spread:
     def spread(M: csr_array) -> Array:
         columns = np.unique(M.indices)
         dense = M[:, columns].toarray()
-        result: Array = dense @ C[np.ix_(columns, columns)] @ dense.T
-        return result
+        return dense @ C[np.ix_(columns, columns)] @ dense.T
 
     return spread
 
@@ -55,5 +53,4 @@ def _roots(C: Array) -> Array:
         raise CovarianceError(
             "The covariance of a pose is not positive definite: pass covariances as the mapper returns them."
         )
-    roots: Array = (vectors * np.sqrt(np.maximum(values, 0))[:, None]) @ vectors.swapaxes(1, 2)
-    return roots
+    return (vectors * np.sqrt(np.maximum(values, 0))[:, None]) @ vectors.swapaxes(1, 2)

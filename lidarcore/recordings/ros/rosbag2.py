@@ -11,8 +11,8 @@ from urllib.parse import quote
 
 from lidarcore.body_mask import from_text
 from lidarcore.errors import MaskError, RecordingError
+from lidarcore.files.foreign_database import bound, stores_its_columns
 from lidarcore.files.streams import DAMAGE, MEBIBYTE, ZSTD, Unpacker, is_packed, open_stream, read_head
-from lidarcore.foreign_database import bound, stores_its_columns
 from lidarcore.recordings.ros.mcap import MASK, McapReader
 from lidarcore.recordings.ros.messages import MOST_TOPICS, WANTED, Message, check_topics, plain_type
 from lidarcore.recordings.ros.recording import RosRecording

@@ -43,9 +43,8 @@ class Session:
         answer, self._early = handshake.start(self.port, asked)
         # The sensor forgets a speed that was set before the scan began.
         handshake.set_speed(self.port, options.rpm)
-        self.mode = handshake.mode_sending(
-            answer, asked, self.modes
-        )  # what comes counts, not what was asked for
+        # What comes counts, not what was asked for.
+        self.mode = handshake.mode_sending(answer, asked, self.modes)
         self.decoder = StreamDecoder(answer, self.mode.us_per_sample, options.baud)
         self._packets = 0
         self._last = time.monotonic()

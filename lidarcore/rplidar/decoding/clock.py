@@ -46,5 +46,4 @@ class SampleClock:
 
     def times(self, indices: Ints) -> Array:
         """When (s) the samples of these indices, counted from 0, were measured."""
-        times: Array = self._zero - self._delay + self.period * (indices + 1).astype(np.float64)
-        return times
+        return self._zero - self._delay + self.period * (indices + 1).astype(np.float64)

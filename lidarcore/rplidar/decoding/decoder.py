@@ -47,12 +47,8 @@ class StreamDecoder:
             behind -= len(packets)
             counts.packets += len(packets) // self._size
             self._sequence.add(skipped, packets, arrival, behind)
-        return self._take()
-
-    def _take(self) -> list[Revolution]:
-        completed = self._sequence.completed
-        revolutions = completed.copy()
-        completed.clear()
-        self.statistics.revolutions += len(revolutions)
-        self.statistics.samples += sum(map(len, revolutions))
+        revolutions = self._sequence.completed.copy()
+        self._sequence.completed.clear()
+        counts.revolutions += len(revolutions)
+        counts.samples += sum(map(len, revolutions))
         return revolutions

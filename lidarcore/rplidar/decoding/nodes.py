@@ -176,9 +176,8 @@ class NodeSequence:
         """The nodes whose angle fits the spacing of the turn, if that is all there is to judge them by."""
         if self._format.samples > 1:
             return nodes
-        wrong = misfits(self._turned(nodes[ANGLE])) & (
-            nodes[DISTANCE] > 0
-        )  # where nothing returned, nothing is bent
+        # Where nothing returned, nothing is bent.
+        wrong = misfits(self._turned(nodes[ANGLE])) & (nodes[DISTANCE] > 0)
         self._counts.drop("unfit_packets", int(wrong.sum()))
         return nodes[:, ~wrong]
 

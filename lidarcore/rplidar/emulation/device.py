@@ -4,6 +4,7 @@ import math
 import struct
 from collections.abc import Iterator
 
+from lidarcore.rplidar.decoding.packets import FORMATS
 from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.rplidar.emulation.scan import Motor, Packet, Room, packets
 from lidarcore.rplidar.protocol import (
@@ -18,8 +19,6 @@ from lidarcore.rplidar.protocol import (
     RequestReader,
     ScanMode,
 )
-
-PACKET_SIZES: dict[int, int] = {Answer.NODES: 5, Answer.DENSE: 84}
 
 _STANDARD, _DENSE_BOOST = S1_MODES
 _SERIAL = "E0D1C8F0B7A59384C2E3A4F5B6C7D8E9"
@@ -149,7 +148,7 @@ class EmulatedS1(Device):
             return b""
         self._motor.coast(now)
         self._motor.wanted = self._motor.wanted or 6.0 * self._options.rpm
-        self.packet_size = PACKET_SIZES[mode.answer_type]
+        self.packet_size = FORMATS[Answer(mode.answer_type)].size
         self.play(packets(mode, self._motor, self._room, self._options.baud, wait=wait))
         return Descriptor(mode.answer_type, self.packet_size, repeated=True).encode()
 

@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 from pydantic import ConfigDict, Field, ValidationError
 from pydantic.dataclasses import dataclass
@@ -12,66 +12,59 @@ from lidarcore.noise import SensorNoise
 
 FIRST_LINE = "RPLIDAR S1 emulated on "  # and the port: what the emulator prints when it is there
 
-Share = Annotated[float, Field(ge=0, le=1)]
-Rpm = Annotated[int, Field(ge=1, le=2000)]
-Seconds = Annotated[float, Field(ge=0, le=60)]
+_RPM = {"ge": 1, "le": 2000}
+_SECONDS = {"ge": 0, "le": 60}
+
+
+def _option(default: Any, text: str, **bounds: Any) -> Any:
+    return Field(default, description=text, kw_only=True, **bounds)
+
+
+def _share(default: float, text: str) -> Any:
+    return _option(default, text, ge=0, le=1)
 
 
 @dataclass(config=ConfigDict(extra="forbid"), frozen=True, kw_only=True)
 class EmulatorOptions:
     """Settings of the emulated RPLIDAR S1. Raises pydantic's ValidationError for values out of range."""
 
-    link: Annotated[Path | None, Field(description="path of the port; in a private folder if not given")] = (
-        None
+    link: Path | None = _option(None, "path of the port; in a private folder if not given")
+    replay: Path | None = _option(None, "a raw capture: answer and send as it did, no simulation")
+    seed: int = _option(0, "of everything that is random", ge=0)
+
+    people: int = _option(2, "how many walk about the room", ge=0, le=20)
+    moving: bool = _option(False, "the sensor moves along a path")
+    sigma_range: float = _option(0.01, "noise of the ranges, m", gt=0, le=1)
+    sigma_bearing: float = _option(0.001, "noise of the bearings, rad", gt=0, le=0.05)
+    range_growth: float = _option(
+        0.0003, "times the square of a range: what its noise grows by, 1/m", ge=0, le=0.1
     )
-    replay: Annotated[
-        Path | None, Field(description="a raw capture: answer and send as it did, no simulation")
-    ] = None
-    seed: Annotated[int, Field(ge=0, description="of everything that is random")] = 0
-
-    people: Annotated[int, Field(ge=0, le=20, description="how many walk about the room")] = 2
-    moving: Annotated[bool, Field(description="the sensor moves along a path")] = False
-    sigma_range: Annotated[float, Field(gt=0, le=1, description="noise of the ranges, m")] = 0.01
-    sigma_bearing: Annotated[float, Field(gt=0, le=0.05, description="noise of the bearings, rad")] = 0.001
-    range_growth: Annotated[
-        float, Field(ge=0, le=0.1, description="times the square of a range: what its noise grows by, 1/m")
-    ] = 0.0003
-    unevenness: Annotated[
-        float, Field(ge=0, le=0.1, description="standard deviation of the walls from straight lines, m")
-    ] = 0.004
-    unevenness_length: Annotated[
-        float, Field(ge=0.005, le=2, description="distance along a wall over which that is alike, m")
-    ] = 0.08
-    mixed: Annotated[
-        Share, Field(description="share of the beams at an edge that report a range between")
-    ] = 0.5
-    dropouts: Annotated[Share, Field(description="share of the beams without return for no reason")] = 0.003
-
-    rpm: Annotated[Rpm, Field(description="speed until another one is asked for")] = 600
-    min_rpm: Annotated[Rpm, Field(description="lowest speed")] = 480
-    max_rpm: Annotated[Rpm, Field(description="highest speed")] = 900
-    jitter: Annotated[Share, Field(description="standard deviation of the speed, as a share of it")] = 0.002
-    spin_up: Annotated[Seconds, Field(description="time from rest to a stable speed, s")] = 0.5
-    reset: Annotated[Seconds, Field(description="time for which nothing is answered after RESET, s")] = 2.0
-    boot: Annotated[Seconds, Field(description="time for which nothing is answered once plugged in, s")] = 0.0
-
-    baud: Annotated[
-        int, Field(ge=1200, le=4_000_000, description="the sensor's; another one gives garbage")
-    ] = 256_000
-    health: Annotated[int, Field(ge=0, le=2, description="0 good, 1 warning, 2 protection stop")] = 0
-    health_code: Annotated[int, Field(ge=0, le=65535, description="code beside the health")] = 0
-    health_sticks: Annotated[bool, Field(description="RESET does not mend the health")] = False
-    streaming: Annotated[bool, Field(description="scanning already, as after a client that crashed")] = False
-    legacy_only: Annotated[bool, Field(description="knows SCAN only: no express scan, no configuration")] = (
-        False
+    unevenness: float = _option(0.004, "standard deviation of the walls from straight lines, m", ge=0, le=0.1)
+    unevenness_length: float = _option(
+        0.08, "distance along a wall over which that is alike, m", ge=0.005, le=2
     )
-    silent_conf: Annotated[
-        bool, Field(description="leaves every question about configuration unanswered")
-    ] = False
+    mixed: float = _share(0.5, "share of the beams at an edge that report a range between")
+    dropouts: float = _share(0.003, "share of the beams without return for no reason")
 
-    flip: Annotated[Share, Field(description="share of the packets with a bit flipped")] = 0.0
-    lose: Annotated[Share, Field(description="share of the packets that are lost")] = 0.0
-    lose_bytes: Annotated[Share, Field(description="share of the bytes that are lost")] = 0.0
+    rpm: int = _option(600, "speed until another one is asked for", **_RPM)
+    min_rpm: int = _option(480, "lowest speed", **_RPM)
+    max_rpm: int = _option(900, "highest speed", **_RPM)
+    jitter: float = _share(0.002, "standard deviation of the speed, as a share of it")
+    spin_up: float = _option(0.5, "time from rest to a stable speed, s", **_SECONDS)
+    reset: float = _option(2.0, "time for which nothing is answered after RESET, s", **_SECONDS)
+    boot: float = _option(0.0, "time for which nothing is answered once plugged in, s", **_SECONDS)
+
+    baud: int = _option(256_000, "the sensor's; another one gives garbage", ge=1200, le=4_000_000)
+    health: int = _option(0, "0 good, 1 warning, 2 protection stop", ge=0, le=2)
+    health_code: int = _option(0, "code beside the health", ge=0, le=65535)
+    health_sticks: bool = _option(False, "RESET does not mend the health")
+    streaming: bool = _option(False, "scanning already, as after a client that crashed")
+    legacy_only: bool = _option(False, "knows SCAN only: no express scan, no configuration")
+    silent_conf: bool = _option(False, "leaves every question about configuration unanswered")
+
+    flip: float = _share(0.0, "share of the packets with a bit flipped")
+    lose: float = _share(0.0, "share of the packets that are lost")
+    lose_bytes: float = _share(0.0, "share of the bytes that are lost")
 
     @property
     def noise(self) -> SensorNoise:

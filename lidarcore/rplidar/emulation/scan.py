@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lidarcore.arrays import Array
+from lidarcore.rplidar.decoding.packets import FORMATS
 from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.rplidar.protocol import Answer, ScanMode, encode_dense, encode_nodes
 from lidarcore.simulation.paths import ROUND, standing, wandering
@@ -17,7 +18,7 @@ Packet = tuple[float, bytes]  # due (s), and what is sent then
 Encode = Callable[[float, Array, Array, Array], bytes]
 
 _BLOCK = 0.1  # s that are simulated at once: a new speed takes effect that late at most
-_CAPSULE = 40  # samples in a dense capsule
+_CAPSULE = FORMATS[Answer.DENSE].samples
 _NODES = 16  # legacy nodes sent at once, as a USB adapter gathers them
 _SPIN_STEP = 0.01  # s
 _STABLE = 0.01  # share of the speed wanted that the motor may be off
@@ -72,10 +73,8 @@ class Room:
 
 def furnished(options: EmulatorOptions, rng: np.random.Generator, now: float) -> Room:
     """The furnished room with people in it, from now on."""
-    world, path = (
-        furnished_room().uneven(options.noise, options.seed),
-        wandering if options.moving else standing,
-    )
+    world = furnished_room().uneven(options.noise, options.seed)
+    path = wandering if options.moving else standing
     way = path(np.linspace(0, 2 * ROUND, 100))[:, :2]
     people = [Person(world, rng, way) for _ in range(options.people)]
     optics = Optics(options.noise, options.mixed, options.dropouts)
@@ -88,7 +87,8 @@ def packets(mode: ScanMode, motor: Motor, room: Room, baud: int, *, wait: bool) 
     """Endless packets of a scan from the motor's time on; if it waits, only once the motor is stable."""
     while wait and not motor.is_stable:
         motor.coast(motor.time + _SPIN_STEP)
-    encode, samples, size = _FORMATS[mode.answer_type]
+    encode, samples = _ENCODERS[mode.answer_type]
+    size = FORMATS[Answer(mode.answer_type)].size
     period = mode.us_per_sample * 1e-6
     delay = 1.5 * period + 10 * size / baud  # from a sample to its arrival, as Slamtec's SDK has it
     count = round(_BLOCK / (samples * period))
@@ -119,8 +119,8 @@ def _split(data: bytes, size: int) -> Iterator[bytes]:
     return (data[at : at + size] for at in range(0, len(data), size))
 
 
-# Of each answer type: how a block is encoded, samples sent at once, bytes in a packet as the protocol has it.
-_FORMATS: dict[int, tuple[Encode, int, int]] = {
-    Answer.NODES: (_encode_nodes, _NODES, 5),
-    Answer.DENSE: (_encode_dense, _CAPSULE, 84),
+# Of each answer type: how a block is encoded, and samples sent at once.
+_ENCODERS: dict[int, tuple[Encode, int]] = {
+    Answer.NODES: (_encode_nodes, _NODES),
+    Answer.DENSE: (_encode_dense, _CAPSULE),
 }

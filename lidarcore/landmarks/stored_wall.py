@@ -3,14 +3,50 @@
 import math
 import sqlite3
 from collections.abc import Iterable
-from dataclasses import astuple
+from dataclasses import astuple, dataclass, fields
 
 from lidarcore.landmarks.database import AT_ONCE, Database
-from lidarcore.landmarks.wall import COLUMNS, StoredWall
 
-_WALL = ", ".join(COLUMNS)
-_STATE = ", ".join(COLUMNS[1:])  # all but the id
-_VALUES = ", ".join("?" for _ in COLUMNS)
+
+@dataclass(frozen=True, slots=True)
+class StoredWall:
+    """A surface seen from one side, in the frame of its map: x cos(alpha) + y sin(alpha) = r, rad and m.
+
+    id                                its own in the map, as the one who mapped gave it
+    var_alpha, cov_alpha_r, var_r     covariance of the line: rad², rad m, m²
+    x1, y1, x2, y2                    m, its ends; who looks from the first to the second has the free side on the left
+    length, var_length                m, m²
+    ended_1, ended_2                  0 at an end beyond which the wall may go on, for nobody looked there
+    corner_1, corner_2                1 at an end that is a corner
+    first_seen, last_seen             s
+    count                             number of keyframes that saw it
+    """
+
+    id: int
+    alpha: float
+    r: float
+    var_alpha: float
+    cov_alpha_r: float
+    var_r: float
+    x1: float
+    y1: float
+    x2: float
+    y2: float
+    length: float
+    var_length: float
+    ended_1: int
+    ended_2: int
+    corner_1: int
+    corner_2: int
+    first_seen: float
+    last_seen: float
+    count: int
+
+
+_COLUMNS = tuple(one.name for one in fields(StoredWall))
+_WALL = ", ".join(_COLUMNS)
+_STATE = ", ".join(_COLUMNS[1:])  # all but the id
+_VALUES = ", ".join("?" for _ in _COLUMNS)
 _INSERT = f"INSERT INTO walls (session, {_WALL}) VALUES (?, {_VALUES})"
 _REMEMBER = f"INSERT OR REPLACE INTO wall_history (session, second, wall, {_STATE}) VALUES (?, ?, {_VALUES})"
 

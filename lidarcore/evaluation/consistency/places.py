@@ -6,15 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.compiled import kernel
-from lidarcore.corners import intersect
-from lidarcore.evaluation.consistency.cramer_rao import bounded_line
+from lidarcore.evaluation.consistency.cramer_rao import bound_corners
 from lidarcore.geometry import unit_vectors
-from lidarcore.lines import LINE_FIELDS
 from lidarcore.noise import SensorNoise
 from lidarcore.simulation import random_pose
 from lidarcore.simulation.world import World
-from lidarcore.tables import CORNER_CONSISTENT, CORNER_FIELDS
 
 MIN_BEAMS, MIN_EXTENT = 8, 0.4  # a stretch of wall counts as seen from this many beams and metres on
 CLEARANCE = 0.4  # m, of the sensor from every wall
@@ -92,7 +88,7 @@ def look(world: World, joints: Array, pose: Array, noise: SensorNoise, beams: in
     lines = _lines(_turned(world.walls[:, 1] - world.walls[:, 0], turn)[wall], points[first])
     bounds = np.empty((len(j), 2, 2))
     variances = noise.sigma_range**2, noise.sigma_bearing**2
-    _bound_corners(bearings, first[pairs], count[pairs], lines[pairs], *variances, bounds)
+    bound_corners(bearings, first[pairs], count[pairs], lines[pairs], *variances, bounds)
     return Place(ranges, bearings, hit, first[pairs], count[pairs], wall[pairs], corners[j], bounds)
 
 
@@ -104,14 +100,12 @@ def _from_a_start(world: World, pose: Array, bearings: Array) -> tuple[Array, Ar
 
 
 def _turned(xy: Array, turn: complex) -> Array:
-    rotated: Array = (np.ascontiguousarray(xy).view(complex) * turn).view(float)
-    return rotated
+    return (np.ascontiguousarray(xy).view(complex) * turn).view(float)
 
 
 def _cross(a: Array, b: Array) -> Array:
     """(M,) positive where b is less than half a turn counter-clockwise of a, (M, 2) each."""
-    z: Array = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return z
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
 
 
 def _lines(along: Array, points: Array) -> Array:
@@ -119,19 +113,4 @@ def _lines(along: Array, points: Array) -> Array:
     tangent = along / np.linalg.norm(along, axis=1, keepdims=True)
     normal = tangent[:, ::-1] * [1, -1]
     r = (normal * points).sum(1)
-    lines: Array = np.column_stack([normal, r]) * np.where(r < 0, -1.0, 1.0)[:, None]
-    return lines
-
-
-@kernel
-def _bound_corners(
-    bearings: Array, first: Ints, count: Ints, lines: Array, v_rho: float, v_theta: float, bounds: Array
-) -> None:
-    rows, corner = np.empty((2, LINE_FIELDS)), np.empty(CORNER_FIELDS)
-    for p in range(len(first)):
-        for k in range(2):
-            a = first[p, k]
-            nx, ny, r = lines[p, k]
-            bounded_line(bearings[a : a + count[p, k]], nx, ny, r, v_rho, v_theta, rows[k])
-        intersect(rows[0], rows[1], corner)
-        bounds[p] = corner[CORNER_CONSISTENT : CORNER_CONSISTENT + 4].copy().reshape(2, 2)
+    return np.column_stack([normal, r]) * np.where(r < 0, -1.0, 1.0)[:, None]

@@ -1,16 +1,20 @@
-"""A floor plan of the walls: SVG for browsers and print, DXF for CAD."""
+"""A map to look at: a floor plan of the walls as SVG and DXF, the grid with the walls over it as PNG."""
 
 import io
 
 import numpy as np
+from PIL import Image, ImageDraw
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
+from lidarcore.mapping.grid import OccupancyGrid, shades_of
 from lidarcore.mapping.walls import Walls
 
 _MARGIN = 1.0  # m around the plan
 _PIXELS = 1200  # width at which a browser shows it at first
 _BARS = (0.5, 1, 2, 5, 10, 20, 50, 100)  # m, lengths of the scale
+_WALL, _CORNER, _PATH = (200, 30, 30), (20, 60, 200), (60, 160, 190)  # colours of the picture
+_SMALLEST = 1500  # pixels that its longer side should have
 _LAYERS = {"WALLS": 7, "CORNERS": 1, "PATH": 5}  # and their colours in AutoCAD's index
 
 
@@ -55,6 +59,28 @@ def plan_dxf(walls: Walls, path: Array) -> str:
     text = io.StringIO()
     document.write(text)
     return text.getvalue()
+
+
+def map_png(grid: OccupancyGrid, walls: Walls, path: Array) -> bytes:
+    """The picture as PNG, y up; path (T, 2) m."""
+    shades = shades_of(grid)
+    zoom = max(1, _SMALLEST // max(shades.shape))
+    picture = Image.fromarray(shades).convert("RGB")
+    picture = picture.resize((picture.width * zoom, picture.height * zoom), Image.Resampling.NEAREST)
+    draw = ImageDraw.Draw(picture)
+    if len(path) > 1:
+        draw.line(_pixels(grid, path, zoom), fill=_PATH, width=1)
+    for ends in walls.ends:
+        draw.line(_pixels(grid, ends, zoom), fill=_WALL, width=2)
+    for x, y in _pixels(grid, walls.corners.xy, zoom):
+        draw.ellipse([x - 3, y - 3, x + 3, y + 3], outline=_CORNER)
+    file = io.BytesIO()
+    picture.save(file, "PNG")
+    return file.getvalue()
+
+
+def _pixels(grid: OccupancyGrid, xy: Array, zoom: int) -> list[tuple[float, float]]:
+    return [(x * zoom, (len(grid.cells) - y) * zoom) for x, y in grid.in_cells(xy).tolist()]
 
 
 def _extent(walls: Walls, path: Array) -> tuple[Array, Array]:

@@ -1,12 +1,12 @@
 """What one scan says of walls and corners, ready to be compared with what another says from elsewhere."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.features import Features
-from lidarcore.geometry import act, left_of, unit_vectors
+from lidarcore.geometry import left_of, unit_vectors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,14 +45,8 @@ class FeatureSet:
         if not sigma:
             return self
         added = sigma**2 * self._unit_systematic()
-        return FeatureSet(
-            self.lines,
-            self.ends,
-            self.covariances + added,
-            self.corners,
-            self.corner_covariances + self._of_corners(added),
-            self.walls,
-        )
+        corner_covariances = self.corner_covariances + self._of_corners(added)
+        return replace(self, covariances=self.covariances + added, corner_covariances=corner_covariances)
 
     def _unit_systematic(self) -> Array:
         """(M, 2, 2) of alpha and r, for a sigma of 1 m."""
@@ -61,8 +55,7 @@ class FeatureSet:
         a_a = 1 / half**2
         a_r = middle * a_a
         r_r = 1 + middle * a_r
-        matrices: Array = np.stack([a_a, a_r, a_r, r_r], -1).reshape(-1, 2, 2)
-        return matrices
+        return np.stack([a_a, a_r, a_r, r_r], -1).reshape(-1, 2, 2)
 
     def _of_corners(self, added: Array) -> Array:
         """(K, 2, 2) m² that covariances (M, 2, 2) of the lines make of corners: n . x = r for both lines."""
@@ -71,8 +64,7 @@ class FeatureSet:
         slope = np.stack([-along, np.ones_like(along)], -1)  # of n . x - r, by alpha and r, negative
         across = np.einsum("kwi,kwij,kwj->kw", slope, added[self.walls], slope)
         inverse = np.linalg.inv(normals)
-        covariances: Array = np.einsum("kiw,kw,kjw->kij", inverse, across, inverse)
-        return covariances
+        return np.einsum("kiw,kw,kjw->kij", inverse, across, inverse)
 
 
 def moved(lines: Array, pose: Array) -> tuple[Array, Array, Array]:
@@ -86,9 +78,3 @@ def moved(lines: Array, pose: Array) -> tuple[Array, Array, Array]:
     by_line[:, 0, 0] = by_line[:, 1, 1] = 1
     by_line[:, 1, 0] = turned
     return np.column_stack([alpha, lines[:, 1] + normal @ pose[:2]]), by_pose, by_line
-
-
-def moved_ends(ends: Array, pose: Array) -> Array:
-    """(M, 2, 2) m, ends of walls in frame a, from T_a_b (3,)."""
-    there: Array = act(pose, ends)
-    return there
