@@ -48,14 +48,6 @@ class OdometryPose(Body):
     heading: Annotated[Number, Field(description="rad")]
 
 
-class IntervalJson(TypedDict):
-    """A figure and the ends of its 95 % confidence interval; null where it cannot be told yet."""
-
-    value: float | None
-    low: float | None
-    high: float | None
-
-
 class SegmentJson(TypedDict):
     """A wall segment by one method: line in normal form with its covariance, end points, m and rad, sensor frame."""
 

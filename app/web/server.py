@@ -10,7 +10,7 @@ from fastapi.staticfiles import StaticFiles
 from starlette.responses import FileResponse, Response
 
 from ..scene.palette import stylesheet
-from . import problems
+from . import openapi, problems
 from .documentation import Documentation
 from .metrics import metrics_router
 from .routes import (
@@ -82,7 +82,7 @@ def create_app(options: ServerOptions) -> FastAPI:
     )
     app.state.server = state
     problems.install(app)
-    problems.document(app)
+    openapi.document(app)
     api = APIRouter(prefix=API)
     for module in ROUTES:
         api.include_router(module.router)

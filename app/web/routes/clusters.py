@@ -13,7 +13,6 @@ from ..problems import documented, encode
 from ..schemas import ClusterJson
 from ..serializers import clusters_json
 from .dependencies import CurrentFrame
-from .examples import CLUSTER, ok
 
 router = APIRouter(tags=["frame"])
 
@@ -26,7 +25,8 @@ Method = Annotated[
 @router.get(
     "/clusters",
     response_model=list[ClusterJson],
-    responses=ok([CLUSTER], "The clusters of the newest scan") | documented(404, 422),
+    response_description="The clusters of the newest scan",
+    responses=documented(404, 422),
 )
 def clusters(frame: CurrentFrame, method: Method = None) -> Response:
     """The clusters of the newest scan, found when asked for. Metres, sensor frame."""

@@ -10,11 +10,11 @@ from lidarcore import Features
 from ...errors import NotFoundError
 from ...pipeline.frame import Frame
 from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns, csv_text, values
+from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import CornerJson, FrameJson, SegmentJson
 from ..serializers import corners_json, frame_text, segments_json
 from .dependencies import CurrentFrame, CurrentHub
-from .examples import CORNER, FRAME, SEGMENT, ok
 
 router = APIRouter(tags=["frame"], responses=documented(404, 422))
 
@@ -25,7 +25,7 @@ Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with 
 Points = Annotated[bool, Query(description="with the measured points")]
 
 
-@router.get("/frame", response_model=FrameJson, responses=ok(FRAME, "The newest frame"))
+@router.get("/frame", response_model=FrameJson, response_description="The newest frame")
 def frame(frame: CurrentFrame, points: Points = False) -> Response:
     """Everything found in the newest scan, by every method that runs."""
     return Response(frame_text(frame, points), media_type="application/json")
@@ -34,7 +34,8 @@ def frame(frame: CurrentFrame, points: Points = False) -> Response:
 @router.get(
     "/segments",
     response_model=list[SegmentJson],
-    responses=ok([SEGMENT], "The segments of the newest scan", csv="id,alpha,r,x_start,y_start,..."),
+    response_description="The segments of the newest scan",
+    responses=formats(csv="id,alpha,r,x_start,y_start,..."),
 )
 def segments(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json") -> Response:
     """The segments by one method, in the order of the ring. Metres and radians, sensor frame."""
@@ -47,7 +48,8 @@ def segments(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json"
 @router.get(
     "/corners",
     response_model=list[CornerJson],
-    responses=ok([CORNER], "The corners of the newest scan", csv="id,segment_1,segment_2,x,y,..."),
+    response_description="The corners of the newest scan",
+    responses=formats(csv="id,segment_1,segment_2,x,y,..."),
 )
 def corners(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json") -> Response:
     """The corners that one method found; ids last from frame to frame. Metres and radians, sensor frame."""

@@ -19,9 +19,9 @@ from lidarcore.mapping.walls import Walls
 
 from ...errors import NotFoundError
 from ...pipeline.runtime import Runtime
+from ..openapi import MEDIA_TYPES
 from ..problems import documented
 from .dependencies import CurrentRuntime, Heavy
-from .examples import MEDIA_TYPES
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422))
 

@@ -24,10 +24,10 @@ from lidarcore.landmarks import (
 
 from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
+from ..openapi import MEDIA_TYPES, formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from .dependencies import CurrentLandmarks
-from .examples import LANDMARK, MEDIA_TYPES, ok
 
 MOST, USUAL = 1000, 100  # landmarks of a page
 
@@ -58,10 +58,6 @@ class LandmarkHistoryJson(TypedDict):
     history: list[Landmark]
     next: float | None
 
-
-PAGE = {"session": 3, "landmarks": [LANDMARK], "next": 41}
-NEIGHBOURS = {"session": 3, "neighbours": [{"distance": 0.412, "landmark": LANDMARK}]}
-HISTORY = {"session": 3, "landmark": LANDMARK, "history": [LANDMARK], "next": None}
 
 Metres = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE, allow_inf_nan=False)]
 
@@ -138,11 +134,9 @@ Limit = Annotated[int, Query(ge=1, le=MOST, description="at most so many")]
 @router.get(
     "",
     response_model=LandmarksJson,
-    responses=ok(
-        PAGE,
-        "A page; for the one after it give `next` as `after`, or follow the Link header",
-        csv="x_m,y_m,var_x_m2,cov_xy_m2,...",
-        geojson={"type": "FeatureCollection", "features": []},
+    response_description="A page; for the one after it give `next` as `after`, or follow the Link header",
+    responses=formats(
+        csv="x_m,y_m,var_x_m2,cov_xy_m2,...", geojson={"type": "FeatureCollection", "features": []}
     ),
 )
 def find(
@@ -170,7 +164,7 @@ def find(
     return answer
 
 
-@router.get("/nearest", response_model=NeighboursJson, responses=ok(NEIGHBOURS, "The nearest first"))
+@router.get("/nearest", response_model=NeighboursJson, response_description="The nearest first")
 def nearest(
     landmarks: CurrentLandmarks,
     which: Which,
@@ -193,7 +187,7 @@ def nearest(
     return encode({"session": landmark_map.session, "neighbours": found})
 
 
-@router.get("/{id}", response_model=LandmarkHistoryJson, responses=ok(HISTORY, "The landmark"))
+@router.get("/{id}", response_model=LandmarkHistoryJson, response_description="The landmark")
 def read(
     landmarks: CurrentLandmarks,
     id: int,

@@ -1,5 +1,6 @@
 """Where the sensor is: pose, trajectory, initial pose, odometry from outside, the map to localize in."""
 
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,29 +14,18 @@ from ...pipeline.navigation import LocalizationStatus, Navigation
 from ...pipeline.runtime import Runtime
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
+from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Body as Model
 from ..schemas import Coordinate, Matrix3, Number, OdometryPose, Row3
 from ..serializers import pose_json
 from .dependencies import CurrentRuntime
-from .examples import ok
 
 router = APIRouter(tags=["localization"], responses=documented(422))
 
 SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
 MOST_POSES = 10_000
-
-COVARIANCE = [[0.0004, 0.0, 0.0], [0.0, 0.0004, 0.0], [0.0, 0.0, 0.0001]]
-POSE = {
-    "stamp": 1795255000.1, "mode": "slam", "state": "tracking", "message": None, "x": 1.204, "y": -0.311,
-    "heading": 0.52, "covariance": COVARIANCE, "nis": 21.3, "dof": 24,
-}  # fmt: skip
-ROW = {
-    "stamp": 1795255000.1, "x": 1.204, "y": -0.311, "heading": 0.52,
-    "sigma_x": 0.004, "sigma_y": 0.005, "sigma_heading": 0.002,
-}  # fmt: skip
-FED = {"taken": 1204, "refused": 0, "dropped": 0, "stamp": 1795255000.1, "used": True, "problem": None}
-STATE = {"mode": "slam", "method": "landmarks", "session": 3, "map": None, "problem": None, "odometry": FED}
+COLUMNS = [field.name for field in fields(TrackedPose)]
 ODOMETRY = {"stamp": 1795255000.1, "x": 1.2, "y": -0.3, "heading": 0.5}
 ONE = OdometryPose.model_json_schema()
 ONE_OR_SOME = {"anyOf": [ONE, {"type": "array", "items": ONE}], "examples": [ODOMETRY]}
@@ -82,20 +72,20 @@ Limit = Annotated[int, Query(ge=1, le=MOST_POSES, description="at most so many, 
 Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with a header")]
 
 
-@router.get("/localization", responses=ok(STATE, "What is localized, and in which map"))
+@router.get("/localization", response_description="What is localized, and in which map")
 def read(runtime: CurrentRuntime) -> LocalizationStatus:
     """Whether the pose is estimated, and in which map."""
     return runtime.localization()
 
 
-@router.post("/localization/reset", responses=ok(STATE, "What is localized now"))
+@router.post("/localization/reset", response_description="What is localized now")
 def reset(runtime: CurrentRuntime) -> LocalizationStatus:
     """Start over: SLAM with an empty map in a new session, localization from nothing."""
     runtime.navigate(Navigation.reset)
     return runtime.localization()
 
 
-@router.put("/localization/map", responses=ok(STATE, "What is localized in") | documented(404))
+@router.put("/localization/map", response_description="What is localized in", responses=documented(404))
 def choose_map(
     runtime: CurrentRuntime, choice: Annotated[MapChoice, Body(examples=[{"session": 3}])]
 ) -> LocalizationStatus:
@@ -104,7 +94,7 @@ def choose_map(
     return runtime.localization()
 
 
-@router.get("/pose", responses=ok(POSE, "The pose after the newest scan") | documented(404))
+@router.get("/pose", response_description="The pose after the newest scan", responses=documented(404))
 def pose(runtime: CurrentRuntime) -> CurrentPoseJson:
     """Where the sensor is."""
     localization = runtime.frame.localization if runtime.frame else None
@@ -123,7 +113,7 @@ def pose(runtime: CurrentRuntime) -> CurrentPoseJson:
     }
 
 
-@router.post("/pose", responses=ok(STATE, "The pose is set") | documented(409))
+@router.post("/pose", response_description="The pose is set", responses=documented(409))
 def place(
     runtime: CurrentRuntime,
     pose: Annotated[InitialPose, Body(examples=[{"x": 1.0, "y": 0.5, "heading": 0.0}])],
@@ -139,7 +129,8 @@ def place(
 @router.get(
     "/trajectory",
     response_model=TrajectoryJson,
-    responses=ok({"poses": [ROW]}, "The poses of this run, the oldest first", csv=",".join(ROW)),
+    response_description="The poses of this run, the oldest first",
+    responses=formats(csv=",".join(COLUMNS)),
 )
 def trajectory(
     runtime: CurrentRuntime, since: Since = None, limit: Limit = 1000, format: Format = "json"
@@ -147,7 +138,7 @@ def trajectory(
     """Where the sensor has been in this run, as the filter had it at each moment; empty if nothing is localized."""
     rows = [row for row in runtime.navigation.trajectory if since is None or row.stamp > since][-limit:]
     if format == "csv":
-        columns = {name: [getattr(row, name) for row in rows] for name in ROW}
+        columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
         return Response(csv_text(columns), media_type="text/csv")
     return encode({"poses": rows})
 

@@ -17,9 +17,9 @@ from lidarcore.landmarks import Session, export_map, export_picture
 from lidarcore.mapping.grid import shades_of, write_ros_map
 
 from ...jobs.landmark_store import LandmarkStore
+from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
 from .dependencies import CurrentLandmarks, Heavy
-from .examples import LANDMARK, MEDIA_TYPES, SESSION, ok
 from .landmarks import SessionId, chosen_map
 
 MAX_BYTES = 32 << 20  # of a map that is loaded, some 150,000 landmarks
@@ -28,7 +28,7 @@ PICTURES = ("png", "zip")
 
 router = APIRouter(prefix="/map", tags=["landmarks"], responses=documented(422, 503))
 
-EXAMPLE = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [LANDMARK]}
+EXAMPLE = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [example("Landmark")]}
 CSV = "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind,method,count,first_seen_s,last_seen_s,id\r\n..."
 FILES: dict[str, Any] = {
     "application/json": {"schema": {"type": "object", "examples": [EXAMPLE]}},
@@ -41,9 +41,8 @@ FILES: dict[str, Any] = {
 @router.get(
     "",
     response_class=FileResponse,
-    responses=ok(
-        EXAMPLE, "The map as a file", csv=CSV, geojson={"type": "FeatureCollection"}, png="...", zip="..."
-    )
+    response_description="The map as a file",
+    responses=formats(json=EXAMPLE, csv=CSV, geojson={"type": "FeatureCollection"}, png="...", zip="...")
     | documented(404),
 )
 async def download(
@@ -68,7 +67,8 @@ async def download(
     "",
     status_code=201,
     openapi_extra={"requestBody": {"required": True, "content": FILES}},
-    responses=ok(SESSION, "The new session", 201) | documented(413),
+    response_description="The new session",
+    responses=documented(413),
 )
 async def upload(
     request: Request,

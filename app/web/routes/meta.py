@@ -12,8 +12,8 @@ from lidarcore import FITTERS
 from lidarcore.clusters import CLUSTERERS
 
 from ...scene.palette import METHOD_STYLES
+from ..openapi import formats
 from .dependencies import CurrentHub, CurrentRuntime
-from .examples import ok
 
 router = APIRouter(tags=["meta"])
 
@@ -89,18 +89,9 @@ METHODS: MethodsJson = {
     ],
     "covariances": ["consistent", "published"],
 }
-HEALTH = {
-    "status": "ok",
-    "ready": True,
-    "uptime_s": 86.1,
-    "clients": 2,
-    "memory_bytes": 187000000,
-    "cpu_s": 4.2,
-}
-VERSION = {"version": "0.1.0", "python": "3.11.7", "viser": "1.1.1", "numba": "0.61.0"}
 
 
-@router.get("/health", responses=ok(HEALTH, "The server is running"))
+@router.get("/health", response_description="The server is running")
 def health(runtime: CurrentRuntime, hub: CurrentHub) -> HealthJson:
     """Whether the kernels are compiled, and what the process has used so far."""
     cpu = _process.cpu_times()
@@ -114,7 +105,7 @@ def health(runtime: CurrentRuntime, hub: CurrentHub) -> HealthJson:
     }
 
 
-@router.get("/version", responses=ok(VERSION, "Versions"))
+@router.get("/version", response_description="Versions")
 def version() -> VersionJson:
     """Versions of this project and of what its results and pictures depend on."""
     return {
@@ -125,7 +116,7 @@ def version() -> VersionJson:
     }
 
 
-@router.get("/methods", responses=ok(METHODS, "The methods"))
+@router.get("/methods", response_description="The methods", responses=formats(json=METHODS))
 def methods() -> MethodsJson:
     """The line fitters, the clustering methods and the kinds of covariance there are."""
     return METHODS

@@ -12,7 +12,6 @@ from ...sources.live import LiveSource
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime
-from .examples import RECORDER, ok
 
 router = APIRouter(prefix="/recorder", tags=["recorder"])
 
@@ -28,13 +27,13 @@ class RecordingStart(StrictBody):
     raw: bool = Field(False, description="also the bytes from the port, in a file of their own")
 
 
-@router.get("", responses=ok(RECORDER, "What is recorded, or was recorded last"))
+@router.get("", response_description="What is recorded, or was recorded last")
 def read(recorder: CurrentRecorder) -> RecorderStatus:
     """What is recorded, or was recorded last."""
     return recorder.status
 
 
-@router.post("/start", responses=ok(RECORDER, "What is recorded now") | documented(409, 422, 507))
+@router.post("/start", response_description="What is recorded now", responses=documented(409, 422, 507))
 def start(
     runtime: CurrentRuntime,
     library: CurrentLibrary,
@@ -58,7 +57,7 @@ def start(
     return recorder.status
 
 
-@router.post("/stop", responses=ok(RECORDER, "What was recorded"))
+@router.post("/stop", response_description="What was recorded")
 def stop(runtime: CurrentRuntime, recorder: CurrentRecorder) -> RecorderStatus:
     """End the recording; without one this does nothing."""
     status = recorder.stop()

@@ -9,11 +9,9 @@ from typing_extensions import TypedDict
 
 from ...sources.library import RecordingEntry
 from ...sources.recording_facts import RecordingFacts
-from ...sources.trash import UNDO_WITHIN
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import CurrentLibrary
-from .examples import RECORDING, ok
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
 
@@ -36,16 +34,7 @@ class RecordingsJson(TypedDict):
     undo_within: float
 
 
-EXAMPLE = {
-    "folder": "recordings",
-    "max_bytes": 1 << 30,
-    "recordings": [RECORDING],
-    "undo_within": UNDO_WITHIN,
-}
-FACTS = {"format": "ROS 1 bag", "topics": ["/scan"], "scans": 812, "duration": 81.2, "problem": None}
-
-
-@router.get("", responses=ok(EXAMPLE, "What can be played"))
+@router.get("", response_description="What can be played")
 def read(library: CurrentLibrary) -> RecordingsJson:
     """What is in the recordings folder, how large an upload may be, and for how long (s) a deletion can be undone."""
     return {
@@ -56,13 +45,13 @@ def read(library: CurrentLibrary) -> RecordingsJson:
     }
 
 
-@router.get("/{name}/facts", responses=ok(FACTS, "What it holds") | documented(404, 422))
+@router.get("/{name}/facts", response_description="What it holds", responses=documented(404, 422))
 def facts(library: CurrentLibrary, name: Name) -> RecordingFacts:
     """Format, lidars, scans and duration (s): the first time, all of the recording is read for that."""
     return library.facts(name)
 
 
-@router.post("/{name}/restore", responses=ok(RECORDING, "It is back") | documented(404, 409, 422, 507))
+@router.post("/{name}/restore", response_description="It is back", responses=documented(404, 409, 422, 507))
 def restore(library: CurrentLibrary, name: Name) -> RecordingEntry:
     """Take back a recording that was deleted less than `undo_within` seconds ago."""
     return library.restore(name)
@@ -79,7 +68,7 @@ def download(library: CurrentLibrary, name: Name) -> FileResponse:
     return FileResponse(library.file(name), filename=name, media_type="application/octet-stream")
 
 
-@router.patch("/{name:path}", responses=ok(RECORDING, "Renamed") | documented(404, 409, 422, 507))
+@router.patch("/{name:path}", response_description="Renamed", responses=documented(404, 409, 422, 507))
 def rename(
     library: CurrentLibrary, name: Name, change: Annotated[NewName, Body(examples=[{"name": "hall.bag"}])]
 ) -> RecordingEntry:
@@ -91,7 +80,8 @@ def rename(
     "/{name:path}",
     status_code=201,
     openapi_extra=RAW_BODY,
-    responses=ok(RECORDING, "Stored and readable", 201) | documented(409, 413, 422, 507),
+    response_description="Stored and readable",
+    responses=documented(409, 413, 422, 507),
 )
 async def upload(
     request: Request,

@@ -8,11 +8,8 @@ from pydantic import model_validator
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import CurrentRuntime
-from .examples import ok
 
 router = APIRouter(prefix="/selection", tags=["selection"])
-
-EXAMPLE = {"corner": 12, "landmark": None}
 
 
 class SelectionBody(StrictBody):
@@ -28,13 +25,13 @@ class SelectionBody(StrictBody):
         return self
 
 
-@router.get("", responses=ok(EXAMPLE, "What is selected"))
+@router.get("", response_description="What is selected")
 def read(runtime: CurrentRuntime) -> SelectionBody:
     """Which corner and which landmark are selected, if any."""
     return SelectionBody(corner=runtime.selection.corner, landmark=runtime.selection.landmark)
 
 
-@router.put("", responses=ok(EXAMPLE, "What is selected") | documented(404, 422))
+@router.put("", response_description="What is selected", responses=documented(404, 422))
 def select(
     runtime: CurrentRuntime,
     selection: Annotated[SelectionBody, Body(examples=[{"corner": 12}])],

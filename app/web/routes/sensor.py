@@ -14,7 +14,6 @@ from ...sources.live import LiveSource
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import CurrentRuntime
-from .examples import DEVICE_FOUND, SUGGESTION, ok
 
 router = APIRouter(tags=["sensor"])
 
@@ -52,7 +51,7 @@ class Fault(StrictBody):
     ]
 
 
-@router.get("/devices", responses=ok([DEVICE_FOUND], "The serial ports"))
+@router.get("/devices", response_description="The serial ports")
 def devices() -> list[FoundDeviceJson]:
     """The serial ports of this machine; those that look like an RPLIDAR are asked, which stops one left turning."""
     return [_found(device) for device in find_devices()]
@@ -60,7 +59,8 @@ def devices() -> list[FoundDeviceJson]:
 
 @router.get(
     "/sensor/mask/suggestion",
-    responses=ok(SUGGESTION, "Sectors for the setting `sensor.mask`") | documented(409),
+    response_description="Sectors for the setting `sensor.mask`",
+    responses=documented(409),
 )
 def suggest(runtime: CurrentRuntime) -> SuggestionJson:
     """Where the robot's own body is: near, and in its place while everything else moves. Nothing is changed.

@@ -12,7 +12,6 @@ from ...errors import ConflictError
 from ...jobs.landmark_store import StoreStatus
 from ..problems import documented, encode
 from .dependencies import CurrentLandmarks
-from .examples import SESSION, ok
 
 router = APIRouter(prefix="/sessions", tags=["landmarks"], responses=documented(503))
 
@@ -22,11 +21,7 @@ class SessionsJson(TypedDict):
     sessions: list[Session]
 
 
-STORE = {"path": "landmarks.db", "session": 3, "landmarks": 27, "behind_s": 0.0, "error": None}
-EXAMPLE = {"store": STORE, "sessions": [SESSION]}
-
-
-@router.get("", response_model=SessionsJson, responses=ok(EXAMPLE, "All sessions, the oldest first"))
+@router.get("", response_model=SessionsJson, response_description="All sessions, the oldest first")
 def read(landmarks: CurrentLandmarks) -> Response:
     """The maps there are, and how well the running one gets to the disk."""
     return encode({"store": landmarks.status, "sessions": landmarks.atlas.sessions()})

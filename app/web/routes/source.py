@@ -17,11 +17,11 @@ from ...sources.player import SourceStatus
 from ...sources.recorded import RecordingSource
 from ...sources.simulated import SimulationSource
 from ...sources.source import Source
+from ..openapi import formats
 from ..problems import documented
 from ..schemas import Body as Model
 from ..schemas import Number, StrictBody
 from .dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime, CurrentTaps
-from .examples import SOURCE, ok
 
 router = APIRouter(prefix="/source", tags=["source"])
 
@@ -144,13 +144,13 @@ SIMULATION: SimulationJson = {
 }
 
 
-@router.get("", responses=ok(SOURCE, "What plays, where it is, and how"))
+@router.get("", response_description="What plays, where it is, and how")
 def read(runtime: CurrentRuntime) -> SourceStatus:
     """What plays, where it is, and how."""
     return runtime.player.status()
 
 
-@router.put("", responses=ok(SOURCE, "What plays now") | documented(403, 404, 409, 422, 503, 504))
+@router.put("", response_description="What plays now", responses=documented(403, 404, 409, 422, 503, 504))
 def play(
     runtime: CurrentRuntime,
     library: CurrentLibrary,
@@ -175,7 +175,11 @@ def play(
     return runtime.player.status()
 
 
-@router.get("/simulation", responses=ok(SIMULATION, "Worlds, and a JSON schema of the settings"))
+@router.get(
+    "/simulation",
+    response_description="Worlds, and a JSON schema of the settings",
+    responses=formats(json=SIMULATION),
+)
 def simulation() -> SimulationJson:
     """Where a simulated robot can drive, and what can be set about it."""
     return SIMULATION
@@ -199,7 +203,7 @@ def _live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> LiveSource:
         raise
 
 
-@router.patch("", responses=ok(SOURCE, "What plays, as it is now") | documented(422))
+@router.patch("", response_description="What plays, as it is now", responses=documented(422))
 def control(
     runtime: CurrentRuntime,
     transport: Annotated[
@@ -213,7 +217,7 @@ def control(
     return runtime.player.status()
 
 
-@router.post("/step", responses=ok(SOURCE, "What plays, as it is now") | documented(422))
+@router.post("/step", response_description="What plays, as it is now", responses=documented(422))
 def step(runtime: CurrentRuntime, step: Annotated[Step, Body(examples=[{"by": -1}])]) -> SourceStatus:
     """Pause, and go some scans on or back."""
     runtime.player.step(step.by)
