@@ -9,7 +9,6 @@ import typer
 
 from .calibrate import calibrate
 from .devices import devices
-from .emulate import PASS_ON, emulate
 from .evaluate import evaluate
 from .experiment import experiment
 from .localize import localize
@@ -92,7 +91,17 @@ cli.command()(localize)
 cli.command("map")(map_recording)
 cli.add_typer(experiment, name="experiment")
 cli.add_typer(evaluate, name="evaluate")
-cli.command(add_help_option=False, context_settings=PASS_ON)(emulate)
+
+
+# The emulator reads its options, and explains them, itself.
+@cli.command(
+    add_help_option=False, context_settings={"ignore_unknown_options": True, "allow_extra_args": True}
+)
+def emulate(context: typer.Context) -> None:
+    """Emulate an RPLIDAR S1 on a pseudo-terminal; --help lists what can be set."""
+    from lidarcore.rplidar.emulator import main
+
+    main(context.args, program="lidarcore emulate")
 
 
 @cli.command()

@@ -15,7 +15,7 @@ from ...jobs.profiles import Profile, ProfileEntry
 from ..openapi import example
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import CurrentCalibration, CurrentProfiles
+from .dependencies import Server
 
 router = APIRouter(tags=["calibration"])
 
@@ -50,14 +50,14 @@ SENSOR_LIST: list[SensorJson] = [
 
 
 @router.get("/calibration", response_description="How far it is, and what was found")
-def read(calibration: CurrentCalibration) -> CalibrationStatus:
+def read(server: Server) -> CalibrationStatus:
     """The calibration under way, or the last one: metres and radians, with 95 % confidence intervals."""
-    return calibration.status()
+    return server.calibration.status()
 
 
 @router.post("/calibration", response_description="It began", responses=documented(409, 422))
 def start(
-    calibration: CurrentCalibration, start: Annotated[CalibrationStart, Body(examples=[{"scans": 200}])]
+    server: Server, start: Annotated[CalibrationStart, Body(examples=[{"scans": 200}])]
 ) -> CalibrationStatus:
     """Measure the noise from the next scans of what plays; the sensor has to stand still in a room with walls.
 
@@ -65,20 +65,20 @@ def start(
 
     All of a recording is taken if it has fewer scans. Ask GET until the state is done or failed.
     """
-    calibration.start(start.scans)
-    return calibration.status()
+    server.calibration.start(start.scans)
+    return server.calibration.status()
 
 
 @router.delete("/calibration", status_code=204)
-def cancel(calibration: CurrentCalibration) -> None:
+def cancel(server: Server) -> None:
     """Give up the calibration under way; without one, forget what the last one found."""
-    calibration.cancel()
+    server.calibration.cancel()
 
 
 @router.get("/profiles", response_description="All noise profiles")
-def profiles(profiles: CurrentProfiles) -> ProfilesJson:
+def profiles(server: Server) -> ProfilesJson:
     """The noise profiles that were saved, and the usual noise of known kinds of sensor. Use one by PATCH /settings."""
-    return {"folder": str(profiles.folder), "profiles": profiles.list(), "sensors": SENSOR_LIST}
+    return {"folder": str(server.profiles.folder), "profiles": server.profiles.list(), "sensors": SENSOR_LIST}
 
 
 @router.get(
@@ -87,9 +87,9 @@ def profiles(profiles: CurrentProfiles) -> ProfilesJson:
     response_description="The file",
     responses=documented(404, 422),
 )
-def profile(profiles: CurrentProfiles, name: Name) -> Response:
+def profile(server: Server, name: Name) -> Response:
     """One profile as a file: a part of the settings, which every command takes as --settings."""
-    return Response(profiles.read(name).text, media_type="application/json")
+    return Response(server.profiles.read(name).text, media_type="application/json")
 
 
 @router.put(
@@ -99,16 +99,16 @@ def profile(profiles: CurrentProfiles, name: Name) -> Response:
     responses=documented(409, 422, 507),
 )
 def save(
-    profiles: CurrentProfiles,
+    server: Server,
     name: Name,
     profile: Annotated[Profile, Body(examples=[example("Profile")])],
     overwrite: Annotated[bool, Query(description="replace a profile of that name")] = False,
 ) -> ProfileEntry:
     """Save a profile: the noise a calibration found, or a file that `lidarcore calibrate` wrote."""
-    return profiles.write(name, profile, overwrite=overwrite)
+    return server.profiles.write(name, profile, overwrite=overwrite)
 
 
 @router.delete("/profiles/{name:path}", status_code=204, responses=documented(404, 422))
-def delete(profiles: CurrentProfiles, name: Name) -> None:
+def delete(server: Server, name: Name) -> None:
     """Delete a profile. Settings that came from it stay."""
-    profiles.delete(name)
+    server.profiles.delete(name)

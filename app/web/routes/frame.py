@@ -14,7 +14,7 @@ from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import CornerJson, FrameJson, SegmentJson
 from ..serializers import corners_json, frame_text, segments_json
-from .dependencies import CurrentFrame, CurrentHub
+from .dependencies import CurrentFrame, Server
 
 router = APIRouter(tags=["frame"], responses=documented(404, 422))
 
@@ -67,10 +67,10 @@ def corners(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json")
 
 
 @router.websocket("/stream")
-async def stream(websocket: WebSocket, hub: CurrentHub, points: Points = False) -> None:
+async def stream(server: Server, websocket: WebSocket, points: Points = False) -> None:
     """Frames and changes of state as they happen, newest first; a slow client gets fewer, never old ones."""
     await websocket.accept()
-    await hub.serve(websocket, points)
+    await server.hub.serve(websocket, points)
 
 
 def _features(frame: Frame, fitter: str | None) -> Features:

@@ -27,7 +27,7 @@ from ...jobs.landmark_store import LandmarkStore
 from ..openapi import MEDIA_TYPES, formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
-from .dependencies import CurrentLandmarks
+from .dependencies import Server
 
 MOST, USUAL = 1000, 100  # landmarks of a page
 
@@ -140,8 +140,8 @@ Limit = Annotated[int, Query(ge=1, le=MOST, description="at most so many")]
     ),
 )
 def find(
+    server: Server,
     request: Request,
-    landmarks: CurrentLandmarks,
     region: Region,
     which: Which,
     limit: Limit = USUAL,
@@ -150,7 +150,7 @@ def find(
     format: Annotated[Literal["json", "csv", "geojson"], Query(description="of the answer")] = "json",
 ) -> Response:
     """Landmarks in a box or a circle, or anywhere, in the order of their ids. Metres, world frame of the session."""
-    landmark_map = chosen_map(landmarks, session)
+    landmark_map = chosen_map(server.landmarks, session)
     page = landmark_map.find(region, which, after, limit)
     if format == "json":
         answer = encode({"session": landmark_map.session, "landmarks": page.landmarks, "next": page.next})
@@ -166,7 +166,7 @@ def find(
 
 @router.get("/nearest", response_model=NeighboursJson, response_description="The nearest first")
 def nearest(
-    landmarks: CurrentLandmarks,
+    server: Server,
     which: Which,
     x: Annotated[Metres, Query(description="m", examples=[1.0])],
     y: Annotated[Metres, Query(description="m", examples=[0.5])],
@@ -181,7 +181,7 @@ def nearest(
     session: SessionId = None,
 ) -> Response:
     """The k landmarks nearest to a point."""
-    landmark_map = chosen_map(landmarks, session)
+    landmark_map = chosen_map(server.landmarks, session)
     noise = [[sigma**2, 0.0], [0.0, sigma**2]] if sigma else None
     found = landmark_map.nearest((x, y), k, which, within, metric, noise)
     return encode({"session": landmark_map.session, "neighbours": found})
@@ -189,13 +189,13 @@ def nearest(
 
 @router.get("/{id}", response_model=LandmarkHistoryJson, response_description="The landmark")
 def read(
-    landmarks: CurrentLandmarks,
+    server: Server,
     id: int,
     after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
     limit: Limit = USUAL,
 ) -> Response:
     """One landmark, and what it was in each second in which it was seen, the oldest first; also if it was removed."""
-    landmark_map = landmarks.atlas.holding(id)
+    landmark_map = server.landmarks.atlas.holding(id)
     history = landmark_map.history(id, after, limit)
     return encode(
         {
@@ -208,9 +208,9 @@ def read(
 
 
 @router.delete("", status_code=204)
-def clear(landmarks: CurrentLandmarks, session: SessionId = None) -> None:
+def clear(server: Server, session: SessionId = None) -> None:
     """Give up the landmarks of a map and their history. What a run goes on seeing comes back: reset it before."""
-    chosen_map(landmarks, session).clear()
+    chosen_map(server.landmarks, session).clear()
 
 
 def _present(landmark_map: LandmarkMap, id: int) -> Landmark | None:

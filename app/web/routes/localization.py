@@ -19,7 +19,7 @@ from ..problems import documented, encode
 from ..schemas import Body as Model
 from ..schemas import Coordinate, Matrix3, Number, OdometryPose, Row3
 from ..serializers import pose_json
-from .dependencies import CurrentRuntime
+from .dependencies import Server
 
 router = APIRouter(tags=["localization"], responses=documented(422))
 
@@ -73,33 +73,33 @@ Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with 
 
 
 @router.get("/localization", response_description="What is localized, and in which map")
-def read(runtime: CurrentRuntime) -> LocalizationStatus:
+def read(server: Server) -> LocalizationStatus:
     """Whether the pose is estimated, and in which map."""
-    return runtime.localization()
+    return server.runtime.localization()
 
 
 @router.post("/localization/reset", response_description="What is localized now")
-def reset(runtime: CurrentRuntime) -> LocalizationStatus:
+def reset(server: Server) -> LocalizationStatus:
     """Start over: SLAM with an empty map in a new session, localization from nothing."""
-    runtime.navigate(Navigation.reset)
-    return runtime.localization()
+    server.runtime.navigate(Navigation.reset)
+    return server.runtime.localization()
 
 
 @router.put("/localization/map", response_description="What is localized in", responses=documented(404))
 def choose_map(
-    runtime: CurrentRuntime, choice: Annotated[MapChoice, Body(examples=[{"session": 3}])]
+    server: Server, choice: Annotated[MapChoice, Body(examples=[{"session": 3}])]
 ) -> LocalizationStatus:
     """Choose the map to localize in; the mode stays what it is."""
-    runtime.navigate(lambda navigation: navigation.choose_map(choice.session))
-    return runtime.localization()
+    server.runtime.navigate(lambda navigation: navigation.choose_map(choice.session))
+    return server.runtime.localization()
 
 
 @router.get("/pose", response_description="The pose after the newest scan", responses=documented(404))
-def pose(runtime: CurrentRuntime) -> CurrentPoseJson:
+def pose(server: Server) -> CurrentPoseJson:
     """Where the sensor is."""
-    localization = runtime.frame.localization if runtime.frame else None
+    localization = server.runtime.frame.localization if server.runtime.frame else None
     if localization is None:
-        raise NotFoundError(f"There is no pose: {_why(runtime)}")
+        raise NotFoundError(f"There is no pose: {_why(server.runtime)}")
     found = localization.tracking
     return {
         "stamp": found.stamp,
@@ -115,15 +115,15 @@ def pose(runtime: CurrentRuntime) -> CurrentPoseJson:
 
 @router.post("/pose", response_description="The pose is set", responses=documented(409))
 def place(
-    runtime: CurrentRuntime,
+    server: Server,
     pose: Annotated[InitialPose, Body(examples=[{"x": 1.0, "y": 0.5, "heading": 0.0}])],
 ) -> LocalizationStatus:
     """Tell where the sensor is. 409 if nothing is localized, or the map is made of whole scans."""
     variances = [pose.sigma_position**2, pose.sigma_position**2, pose.sigma_heading**2]
     covariance = np.diag(variances) if pose.covariance is None else np.array(pose.covariance)
-    wanted, at = runtime.settings.navigation, (pose.x, pose.y, pose.heading)
-    runtime.navigate(lambda navigation: navigation.place(at, covariance, wanted))
-    return runtime.localization()
+    wanted, at = server.runtime.settings.navigation, (pose.x, pose.y, pose.heading)
+    server.runtime.navigate(lambda navigation: navigation.place(at, covariance, wanted))
+    return server.runtime.localization()
 
 
 @router.get(
@@ -132,11 +132,10 @@ def place(
     response_description="The poses of this run, the oldest first",
     responses=formats(csv=",".join(COLUMNS)),
 )
-def trajectory(
-    runtime: CurrentRuntime, since: Since = None, limit: Limit = 1000, format: Format = "json"
-) -> Response:
+def trajectory(server: Server, since: Since = None, limit: Limit = 1000, format: Format = "json") -> Response:
     """Where the sensor has been in this run, as the filter had it at each moment; empty if nothing is localized."""
-    rows = [row for row in runtime.navigation.trajectory if since is None or row.stamp > since][-limit:]
+    poses = server.runtime.navigation.trajectory
+    rows = [row for row in poses if since is None or row.stamp > since][-limit:]
     if format == "csv":
         columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
         return Response(csv_text(columns), media_type="text/csv")
@@ -145,7 +144,7 @@ def trajectory(
 
 @router.post("/odometry", status_code=204)
 def odometry(
-    runtime: CurrentRuntime,
+    server: Server,
     poses: Annotated[Any, WithJsonSchema(ONE_OR_SOME), Body()],
 ) -> None:
     """Feed T_odom_sensor, one pose or some in their order; stamps are Unix seconds, as those of the scans.
@@ -154,7 +153,7 @@ def odometry(
     More than a thousand a second are left out. GET /localization tells what became of them.
     """
     for pose in _poses(poses):
-        runtime.feed(pose.stamp, (pose.x, pose.y, pose.heading))
+        server.runtime.feed(pose.stamp, (pose.x, pose.y, pose.heading))
 
 
 def _poses(body: Any) -> list[OdometryPose]:

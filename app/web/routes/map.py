@@ -19,7 +19,7 @@ from lidarcore.mapping.grid import shades_of, write_ros_map
 from ...jobs.landmark_store import LandmarkStore
 from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
-from .dependencies import CurrentLandmarks, Heavy
+from .dependencies import Server
 from .landmarks import SessionId, chosen_map
 
 MAX_BYTES = 32 << 20  # of a map that is loaded, some 150,000 landmarks
@@ -46,8 +46,7 @@ FILES: dict[str, Any] = {
     | documented(404),
 )
 async def download(
-    landmarks: CurrentLandmarks,
-    heavy: Heavy,
+    server: Server,
     session: SessionId = None,
     format: Annotated[
         Literal["json", "csv", "geojson", "png", "zip"],
@@ -59,8 +58,8 @@ async def download(
 
     If it has an occupancy grid, the picture is of that, in its own resolution.
     """
-    make = partial(_file, landmarks, session, format, resolution)
-    return await anyio.to_thread.run_sync(make, limiter=heavy)
+    make = partial(_file, server.landmarks, session, format, resolution)
+    return await anyio.to_thread.run_sync(make, limiter=server.heavy)
 
 
 @router.post(
@@ -71,8 +70,8 @@ async def download(
     responses=documented(413),
 )
 async def upload(
+    server: Server,
     request: Request,
-    landmarks: CurrentLandmarks,
     format: Annotated[
         Literal["json", "csv", "geojson", "zip"],
         Query(
@@ -96,7 +95,7 @@ async def upload(
                 if file.tell() + len(chunk) > MAX_BYTES:
                     raise ProblemError(413, f"The map is larger than {MAX_BYTES} bytes.")
                 file.write(chunk)
-        return await run_in_threadpool(landmarks.load, path, format, name)
+        return await run_in_threadpool(server.landmarks.load, path, format, name)
 
 
 def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution: float) -> FileResponse:

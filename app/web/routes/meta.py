@@ -13,7 +13,7 @@ from lidarcore.clusters import CLUSTERERS
 
 from ...scene.palette import METHOD_STYLES
 from ..openapi import formats
-from .dependencies import CurrentHub, CurrentRuntime
+from .dependencies import Server
 
 router = APIRouter(tags=["meta"])
 
@@ -92,14 +92,14 @@ METHODS: MethodsJson = {
 
 
 @router.get("/health", response_description="The server is running")
-def health(runtime: CurrentRuntime, hub: CurrentHub) -> HealthJson:
+def health(server: Server) -> HealthJson:
     """Whether the kernels are compiled, and what the process has used so far."""
     cpu = _process.cpu_times()
     return {
         "status": "ok",
-        "ready": runtime.ready,
+        "ready": server.runtime.ready,
         "uptime_s": time.time() - _process.create_time(),
-        "clients": hub.clients,
+        "clients": server.hub.clients,
         "memory_bytes": _process.memory_info().rss,
         "cpu_s": cpu.user + cpu.system,
     }

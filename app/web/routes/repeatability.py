@@ -18,7 +18,7 @@ from ...errors import NotFoundError
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Pair
-from .dependencies import CurrentRepeatability, CurrentRuntime
+from .dependencies import Server
 
 router = APIRouter(prefix="/repeatability", tags=["repeatability"])
 
@@ -53,8 +53,7 @@ _JSON = TypeAdapter(RepeatabilityJson)  # it knows the types, and so takes a qua
     responses=formats(csv=CSV) | documented(422),
 )
 def read(
-    runtime: CurrentRuntime,
-    repeatability: CurrentRepeatability,
+    server: Server,
     format: Annotated[
         Literal["json", "csv"], Query(description="JSON, or CSV: a line for each method and covariance")
     ] = "json",
@@ -64,7 +63,7 @@ def read(
     Switched on by the setting `repeatability.running`. The window starts over when the source, or a setting of the
     extraction, changes, when a recording goes on elsewhere, and when the sensor is moved.
     """
-    summary, running = repeatability.summary(), runtime.settings.repeatability.running
+    summary, running = server.repeatability.summary(), server.runtime.settings.repeatability.running
     if format == "csv":
         return Response(to_csv(summary), media_type="text/csv")
     found = {field.name: getattr(summary, field.name) for field in fields(summary)}
@@ -76,9 +75,9 @@ def read(
 
 
 @router.delete("", status_code=204)
-def clear(repeatability: CurrentRepeatability) -> None:
+def clear(server: Server) -> None:
     """Start over: forget the scans of the window, for instance after the sensor was moved."""
-    repeatability.clear()
+    server.repeatability.clear()
 
 
 @router.get(
@@ -87,9 +86,9 @@ def clear(repeatability: CurrentRepeatability) -> None:
     response_description="Where the corner was seen",
     responses=documented(404, 422),
 )
-def corner(repeatability: CurrentRepeatability, id: int) -> Response:
+def corner(server: Server, id: int) -> Response:
     """Where each method saw one corner of the window: the dots that the claimed ellipses should hold."""
-    return _deviations(id, repeatability.deviations)
+    return _deviations(id, server.repeatability.deviations)
 
 
 @router.get(
@@ -98,9 +97,9 @@ def corner(repeatability: CurrentRepeatability, id: int) -> Response:
     response_description="How the wall was seen",
     responses=documented(404, 422),
 )
-def wall(repeatability: CurrentRepeatability, id: int) -> Response:
+def wall(server: Server, id: int) -> Response:
     """The alpha (rad) and r (m) that each method gave one wall of the window, from their mean."""
-    return _deviations(id, repeatability.wall_deviations)
+    return _deviations(id, server.repeatability.wall_deviations)
 
 
 def _deviations(id: int, deviations: Callable[[int], dict[str, Array]]) -> Response:

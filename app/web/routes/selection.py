@@ -7,7 +7,7 @@ from pydantic import model_validator
 
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import CurrentRuntime
+from .dependencies import Server
 
 router = APIRouter(prefix="/selection", tags=["selection"])
 
@@ -26,19 +26,20 @@ class SelectionBody(StrictBody):
 
 
 @router.get("", response_description="What is selected")
-def read(runtime: CurrentRuntime) -> SelectionBody:
+def read(server: Server) -> SelectionBody:
     """Which corner and which landmark are selected, if any."""
-    return SelectionBody(corner=runtime.selection.corner, landmark=runtime.selection.landmark)
+    selected = server.runtime.selection
+    return SelectionBody(corner=selected.corner, landmark=selected.landmark)
 
 
 @router.put("", response_description="What is selected", responses=documented(404, 422))
 def select(
-    runtime: CurrentRuntime,
+    server: Server,
     selection: Annotated[SelectionBody, Body(examples=[{"corner": 12}])],
 ) -> SelectionBody:
     """Select a corner of the current frame or a landmark of the map by its id, or none."""
     if "corner" in selection.model_fields_set:
-        runtime.select_corner(selection.corner)
+        server.runtime.select_corner(selection.corner)
     if "landmark" in selection.model_fields_set:
-        runtime.select_landmark(selection.landmark)
-    return read(runtime)
+        server.runtime.select_landmark(selection.landmark)
+    return read(server)

@@ -13,7 +13,7 @@ from ...errors import ConflictError
 from ...sources.live import LiveSource
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import CurrentRuntime
+from .dependencies import Server
 
 router = APIRouter(tags=["sensor"])
 
@@ -62,19 +62,19 @@ def devices() -> list[FoundDeviceJson]:
     response_description="Sectors for the setting `sensor.mask`",
     responses=documented(409),
 )
-def suggest(runtime: CurrentRuntime) -> SuggestionJson:
+def suggest(server: Server) -> SuggestionJson:
     """Where the robot's own body is: near, and in its place while everything else moves. Nothing is changed.
 
     Asked of the last 20 s of a sensor, or of 200 scans of a recording as they were measured, without the present mask.
     409 if there are too few of them, or the sensor did not move enough to tell body and room apart.
     """
-    return {"mask": runtime.suggested_mask()}
+    return {"mask": server.runtime.suggested_mask()}
 
 
 @router.post("/emulator", status_code=204, responses=documented(409, 422))
-def obey(runtime: CurrentRuntime, fault: Annotated[Fault, Body(examples=[{"command": "lose 0.05"}])]) -> None:
+def obey(server: Server, fault: Annotated[Fault, Body(examples=[{"command": "lose 0.05"}])]) -> None:
     """Have the emulated sensor show a fault, to see what becomes of it."""
-    source = runtime.player.source
+    source = server.runtime.player.source
     if not isinstance(source, LiveSource) or source.emulator is None:
         raise ConflictError('No emulator is playing: PUT {"kind": "emulator"} to /api/v1/source first.')
     source.emulator.command(fault.command)

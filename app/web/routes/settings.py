@@ -7,7 +7,7 @@ from fastapi import APIRouter, Body
 from ...pipeline.settings import Settings
 from ..openapi import example, formats
 from ..problems import documented
-from .dependencies import CurrentRuntime
+from .dependencies import Server
 
 router = APIRouter(prefix="/settings", tags=["settings"])
 
@@ -16,15 +16,15 @@ PATCH = {"extraction": {"fitter": "wctls", "min_points": 8}, "view": {"compare":
 
 
 @router.get("", response_description="All settings", responses=formats(json=EXAMPLE))
-def read(runtime: CurrentRuntime) -> Settings:
+def read(server: Server) -> Settings:
     """Every setting with its present value, in sections."""
-    return runtime.settings
+    return server.runtime.settings
 
 
 @router.patch(
     "", response_description="All settings as they are now", responses=formats(json=EXAMPLE) | documented(422)
 )
-def change(runtime: CurrentRuntime, patch: Annotated[dict[str, Any], Body(examples=[PATCH])]) -> Settings:
+def change(server: Server, patch: Annotated[dict[str, Any], Body(examples=[PATCH])]) -> Settings:
     """Change some settings by a JSON merge patch (RFC 7396); null puts a default back.
 
     All of it is taken, or nothing. It holds from the next scan on; while paused, the current one is redone.
@@ -32,7 +32,7 @@ def change(runtime: CurrentRuntime, patch: Annotated[dict[str, Any], Body(exampl
     Settings are shared by all who use the server, but for layers, ellipse_scale, theme and rotate of `view`: each
     browser has its own, and takes over what is set here for all.
     """
-    return runtime.set(patch)
+    return server.runtime.set(patch)
 
 
 @router.get(

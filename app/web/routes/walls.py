@@ -23,7 +23,7 @@ from ..openapi import MEDIA_TYPES, formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from ..wall_json import WallJson, wall_rows
-from .dependencies import CurrentLandmarks, CurrentRuntime
+from .dependencies import Server
 from .grid import running_walls
 from .landmarks import USUAL, Limit, Metres, Region
 
@@ -81,13 +81,12 @@ async def _wanted(
 
 
 def _asked(
-    runtime: CurrentRuntime,
-    landmarks: CurrentLandmarks,
+    server: Server,
     session: Annotated[
         int | None, Query(description="of a map that is kept; if not given of the one that SLAM makes now")
     ] = None,
 ) -> WallTable:
-    return running_walls(runtime) if session is None else landmarks.walls(session)
+    return running_walls(server.runtime) if session is None else server.landmarks.walls(session)
 
 
 Asked = Annotated[WallTable, Depends(_asked)]
@@ -144,8 +143,7 @@ def nearest_walls(
     responses=documented(503),
 )
 def history(
-    runtime: CurrentRuntime,
-    landmarks: CurrentLandmarks,
+    server: Server,
     id: int,
     after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
     limit: Limit = USUAL,
@@ -158,11 +156,11 @@ def history(
     So also of one that became part of another. It begins when three keyframes have seen the wall; of a wall of the
     running map it is empty until then.
     """
-    kept = landmarks.session if session is None else session
+    kept = server.landmarks.session if session is None else session
     try:
-        return encode(_kept_history(landmarks, kept, id, after, limit))
+        return encode(_kept_history(server.landmarks, kept, id, after, limit))
     except (NotFoundError, UnknownWallError):
-        wall = _running_wall(runtime, id) if session is None else None
+        wall = _running_wall(server.runtime, id) if session is None else None
         if wall is None:
             raise
         return encode({"session": kept, "wall": wall, "history": [], "next": None})
