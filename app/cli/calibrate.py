@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import MOST, RecordingPath, Set, SettingsFile, Topic, check_folder, settings_from
+from .options import MOST, RecordingPath, Set, SettingsFile, Topic, check_folder, settings_from, to_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,10 +36,7 @@ DEGREES = math.degrees(1)
 def calibrate(
     recording: RecordingPath,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="FILE.json for the noise; other commands read it with --settings"
-        ),
+        Path | None, to_file("FILE.json for the noise; other commands read it with --settings")
     ] = None,
     skip: Annotated[int, typer.Option(min=0, max=MOST, help="scans to skip at the beginning")] = 0,
     scans: Annotated[

@@ -2,13 +2,14 @@
 
 import os
 from dataclasses import replace
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import MOST, Seed, Topic, Workers, check_folder, end_like_ctrl_c
+from .options import MOST, Seed, Topic, Workers, check_folder, end_like_ctrl_c, to_file
 from .progress import ForPrograms, counted
 
 if TYPE_CHECKING:
@@ -27,9 +28,7 @@ def begin() -> None:
     end_like_ctrl_c()
 
 
-Output = Annotated[
-    Path, typer.Option("-o", "--output", help="FILE.html for the report; replaced if it exists")
-]
+Output = Annotated[Path, to_file("FILE.html for the report; replaced if it exists")]
 Quick = Annotated[bool, typer.Option("--quick", help="only 100 scans of each room, to try it out")]
 Recording = Annotated[
     Path | None,
@@ -51,63 +50,45 @@ SigmaBearing = Annotated[
 ]
 
 
-@experiment.command()
-def cwlf(
-    output: Output = Path("cwlf.html"),
-    seed: Seed = 0,
-    scans: Scans = None,
-    recording: Recording = None,
-    topic: Topic = None,
-    sigma_range: SigmaRange = None,
-    sigma_bearing: SigmaBearing = None,
-    quick: Quick = False,
-    workers: Workers = None,
-    for_programs: ForPrograms = False,
-) -> None:
-    """Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time."""
-    check_folder(output)
-    from lidarcore import files
-    from lidarcore.experiments import cwlf as paper
-    from lidarcore.experiments.cwlf_claims import claims
-    from lidarcore.experiments.cwlf_report import html
-    from lidarcore.experiments.environments import Design
+def _add_corner_paper(name: str, about: str) -> None:
+    @experiment.command(name, help=about)
+    def repeat(
+        output: Output = Path(f"{name}.html"),
+        seed: Seed = 0,
+        scans: Scans = None,
+        recording: Recording = None,
+        topic: Topic = None,
+        sigma_range: SigmaRange = None,
+        sigma_bearing: SigmaBearing = None,
+        quick: Quick = False,
+        workers: Workers = None,
+        for_programs: ForPrograms = False,
+    ) -> None:
+        check_folder(output)
+        from lidarcore import files
+        from lidarcore.experiments.environments import Design
 
-    design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
-    _tell_assumption(design, recording)
-    with counted(1 if recording else paper.PARTS, for_programs) as done:
-        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    files.write(output, html(result))
-    _tell(output, claims(result))
+        paper, paper_claims, report = (
+            import_module(f"lidarcore.experiments.{name}{part}") for part in ("", "_claims", "_report")
+        )
+        usual = Design(seed=seed)
+        whole = replace(usual, split_threshold=getattr(paper, "THRESHOLD", usual.split_threshold))
+        design = _design(whole, scans, sigma_range, sigma_bearing, quick)
+        _tell_assumption(design, recording)
+        with counted(1 if recording else paper.PARTS, for_programs) as done:
+            result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
+        files.write(output, report.html(result))
+        _tell(output, paper_claims.claims(result))
 
 
-@experiment.command()
-def wctls(
-    output: Output = Path("wctls.html"),
-    seed: Seed = 0,
-    scans: Scans = None,
-    recording: Recording = None,
-    topic: Topic = None,
-    sigma_range: SigmaRange = None,
-    sigma_bearing: SigmaBearing = None,
-    quick: Quick = False,
-    workers: Workers = None,
-    for_programs: ForPrograms = False,
-) -> None:
-    """Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty."""
-    check_folder(output)
-    from lidarcore import files
-    from lidarcore.experiments import wctls as paper
-    from lidarcore.experiments.environments import Design
-    from lidarcore.experiments.wctls_claims import claims
-    from lidarcore.experiments.wctls_report import html
-
-    whole = Design(seed=seed, split_threshold=paper.THRESHOLD)
-    design = _design(whole, scans, sigma_range, sigma_bearing, quick)
-    _tell_assumption(design, recording)
-    with counted(1 if recording else paper.PARTS, for_programs) as done:
-        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    files.write(output, html(result))
-    _tell(output, claims(result))
+_add_corner_paper(
+    "cwlf",
+    "Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time.",
+)
+_add_corner_paper(
+    "wctls",
+    "Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty.",
+)
 
 
 @experiment.command("clustering-ekf")

@@ -5,12 +5,13 @@ from typing import Annotated
 
 import typer
 
-from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, counting, plural, settings_from
+from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, plural, settings_from, to_file
+from .progress import counting
 
 
 def localize(
     recording: RecordingPath,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="FILE.csv for the poses")] = None,
+    output: Annotated[Path | None, to_file("FILE.csv for the poses")] = None,
     known: Annotated[
         Path | None,
         typer.Option(

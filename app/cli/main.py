@@ -13,7 +13,8 @@ from .evaluate import evaluate
 from .experiment import experiment
 from .localize import localize
 from .map import map_recording
-from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, counting, plural, settings_from
+from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, plural, settings_from, to_file
+from .progress import counting
 from .record import record
 from .serve import serve
 
@@ -46,7 +47,7 @@ def common(
 @cli.command()
 def process(
     recording: RecordingPath,
-    output: Annotated[Path, typer.Option("-o", "--output", help="FILE.csv, FILE.parquet or FILE.geojson")],
+    output: Annotated[Path, to_file("FILE.csv, FILE.parquet or FILE.geojson")],
     topic: Topic = None,
     fitter: Annotated[list[str] | None, typer.Option(help="a method; may be repeated to compare")] = None,
     settings: SettingsFile = None,

@@ -19,9 +19,9 @@ from ..options import (
     Topic,
     Workers,
     check_output,
-    console,
     numbers,
     settings_from,
+    to_file,
 )
 from ..progress import ForPrograms, progress
 from .agreement import agreement
@@ -76,8 +76,7 @@ Scheduler = Annotated[
     typer.Option(metavar="ADDRESS", help="a Dask scheduler, e.g. tcp://host:8786, whose workers do the work"),
 ]
 StudyOutput = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", help="FILE.html for a report; FILE.json or FILE.csv with every figure"),
+    Path | None, to_file("FILE.html for a report; FILE.json or FILE.csv with every figure")
 ]
 
 
@@ -125,6 +124,7 @@ def consistency(
 def _show(study: "Consistency", by_room: bool, seconds: float) -> None:
     from lidarcore import FITTERS
 
+    from ..tables import console
     from .consistency_table import tables
 
     terminal = console(WIDTH)
@@ -144,9 +144,7 @@ def repeatability(
     methods: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="fitters to compare; all if not given")
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="FILE.json with every corner and wall, or FILE.csv")
-    ] = None,
+    output: Annotated[Path | None, to_file("FILE.json with every corner and wall, or FILE.csv")] = None,
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,
@@ -158,6 +156,7 @@ def repeatability(
     from lidarcore.evaluation.repeatability import tables as repeatability_tables
     from lidarcore.evaluation.repeatability.statistics import Repeatability
 
+    from ..tables import console
     from .repeatability_table import remarks, tables
 
     check_output(output, *consistency_tables.FORMATS)

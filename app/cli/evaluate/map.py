@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, counting, numbers, settings_from
+from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, numbers, settings_from
+from ..progress import counting
 
 if TYPE_CHECKING:
     from lidarcore import Array
