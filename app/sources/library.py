@@ -14,7 +14,7 @@ import anyio
 
 from ..errors import ConflictError, InvalidNameError, NotFoundError, TooLargeError, storing
 from .recorded import check_readable
-from .recording_facts import Facts, RecordingFacts
+from .recording_facts import RecordingFacts, facts
 from .trash import PREFIX as TRASHED
 from .trash import Trash
 
@@ -51,7 +51,6 @@ class Library:
     builtin: tuple[Path, ...] = BUILTIN
     in_use: Callable[[], Collection[Path]] = tuple
     trash: Trash = field(default_factory=Trash)
-    _facts: Facts = field(default_factory=Facts)
 
     def list(self) -> list[RecordingEntry]:
         """What could be played: files, and folders that are ROS 2 bags."""
@@ -99,7 +98,7 @@ class Library:
 
     def facts(self, name: str) -> RecordingFacts:
         """What it holds: all of it is read for that, once. Raises what `path` raises."""
-        return self._facts.of(self.path(name))
+        return facts(self.path(name))
 
     def file(self, name: str) -> Path:
         """The recording as one file. Raises what `path` raises, and ConflictError for a folder."""

@@ -18,7 +18,6 @@ from ..pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns
 from ..scene.point_colours import colour_scale
 from .schemas import (
     ClusterJson,
-    ColourScaleJson,
     CornerJson,
     FrameJson,
     InnovationJson,
@@ -60,7 +59,7 @@ def _frame_json(frame: Frame) -> FrameJson:
             "age_ms": 1e3 * frame.age(),
         },
         "extent": frame.extent().round(4).tolist(),
-        "colour_scale": _colour_scale_json(frame),
+        "colour_scale": colour_scale(frame),
         "rate_hz": frame.rate_hz,
         "dropped": frame.dropped,
         "segments": {name: segments_json(found) for name, found in frame.features.items()},
@@ -70,11 +69,6 @@ def _frame_json(frame: Frame) -> FrameJson:
         "clusters": None if frame.clusters is None else clusters_json(frame.clusters),
         "localization": None if frame.localization is None else localization_json(frame.localization),
     }
-
-
-def _colour_scale_json(frame: Frame) -> ColourScaleJson | None:
-    scale = colour_scale(frame)
-    return None if scale is None else {"high": scale.high, "unit": scale.unit, "stops": scale.stops}
 
 
 @lru_cache(2 * KEPT)

@@ -97,7 +97,7 @@ class State:
     def close(self) -> None:
         """End everything, what produces before what is told of it."""
         self.hub.close()
-        for part in (self.runtime, self.studies, self.repeatability, self.calibration):
+        for part in (self.runtime, self.studies, self.calibration):
             part.close()
         self.recorder.stop()
         self.library.trash.empty()

@@ -7,6 +7,7 @@ from lidarcore_app.jobs.calibration import CalibrationStatus
 from lidarcore_app.jobs.profiles import Profile, ProfileEntry
 from lidarcore_app.jobs.recorder import RecorderStatus
 from lidarcore_app.jobs.studies import StudyStatus
+from lidarcore_app.pipeline.frame import Selection
 from lidarcore_app.pipeline.navigation import LocalizationStatus
 from lidarcore_app.pipeline.settings import Settings
 from lidarcore_app.sources.library import RecordingEntry
@@ -19,7 +20,6 @@ from lidarcore_app.web.routes.measure import MeasureJson
 from lidarcore_app.web.routes.meta import HealthJson, MethodsJson, VersionJson
 from lidarcore_app.web.routes.recordings import RecordingsJson
 from lidarcore_app.web.routes.repeatability import DeviationsJson, RepeatabilityJson
-from lidarcore_app.web.routes.selection import SelectionBody
 from lidarcore_app.web.routes.sensor import FoundDeviceJson, SuggestionJson
 from lidarcore_app.web.routes.sessions import SessionsJson
 from lidarcore_app.web.routes.source import SimulationJson
@@ -69,8 +69,8 @@ TYPES = {
     ("put", "/source"): SourceStatus,
     ("patch", "/source"): SourceStatus,
     ("post", "/source/step"): SourceStatus,
-    ("get", "/selection"): SelectionBody,
-    ("put", "/selection"): SelectionBody,
+    ("get", "/selection"): Selection,
+    ("put", "/selection"): Selection,
     ("get", "/clusters"): list[ClusterJson],
     ("get", "/source/simulation"): SimulationJson,
     ("get", "/localization"): LocalizationStatus,

@@ -11,12 +11,11 @@ BASE = {"errors", "isolation"}
 MAY_IMPORT = {
     "errors": set(),
     "isolation": set(),
-    "memory": set(),
     "sources": BASE,
     "pipeline": BASE | {"sources"},
     "scene": BASE | {"sources", "pipeline"},
     "jobs": BASE | {"sources", "pipeline"},
-    "web": BASE | {"memory", "sources", "pipeline", "scene", "jobs"},
+    "web": BASE | {"sources", "pipeline", "scene", "jobs"},
     "cli": BASE | {"sources", "pipeline", "jobs", "benchmarks"},
     "benchmarks": BASE | {"sources", "pipeline", "scene", "jobs", "web", "cli"},
 }

@@ -19,6 +19,7 @@ from lidarcore.landmarks import (
     Landmark,
     LandmarkMap,
     Metric,
+    Neighbour,
     write_landmarks,
 )
 
@@ -40,14 +41,9 @@ class LandmarksJson(TypedDict):
     next: int | None
 
 
-class NeighbourJson(TypedDict):
-    distance: float
-    landmark: Landmark
-
-
 class NeighboursJson(TypedDict):
     session: int
-    neighbours: list[NeighbourJson]
+    neighbours: list[Neighbour]
 
 
 class LandmarkHistoryJson(TypedDict):

@@ -5,6 +5,7 @@ from typing import Annotated, Self
 from fastapi import APIRouter, Body
 from pydantic import model_validator
 
+from ...pipeline.frame import Selection
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import Server
@@ -26,20 +27,19 @@ class SelectionBody(StrictBody):
 
 
 @router.get("", response_description="What is selected")
-def read(server: Server) -> SelectionBody:
+def read(server: Server) -> Selection:
     """Which corner and which landmark are selected, if any."""
-    selected = server.runtime.selection
-    return SelectionBody(corner=selected.corner, landmark=selected.landmark)
+    return server.runtime.selection
 
 
 @router.put("", response_description="What is selected", responses=documented(404, 422))
 def select(
     server: Server,
     selection: Annotated[SelectionBody, Body(examples=[{"corner": 12}])],
-) -> SelectionBody:
+) -> Selection:
     """Select a corner of the current frame or a landmark of the map by its id, or none."""
     if "corner" in selection.model_fields_set:
         server.runtime.select_corner(selection.corner)
     if "landmark" in selection.model_fields_set:
         server.runtime.select_landmark(selection.landmark)
-    return read(server)
+    return server.runtime.selection
