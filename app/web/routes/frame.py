@@ -54,16 +54,11 @@ def segments(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json"
 def corners(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json") -> Response:
     """The corners that one method found; ids last from frame to frame. Metres and radians, sensor frame."""
     found, name = _features(frame, fitter), fitter or next(iter(frame.features))
-    rows = sorted((row for row in frame.corners if name in row.index), key=lambda row: row.index[name])
     if format == "csv":
-        return _csv([row.id for row in rows], CORNER_COLUMNS, found)
-    wanted = {row.id for row in rows}
-    only = [
-        row | {"by_method": {name: row["by_method"][name]}}
-        for row in corners_json(frame)
-        if row["id"] in wanted
-    ]
-    return encode(only)
+        ids = {row.index[name]: row.id for row in frame.corners if name in row.index}
+        return _csv([ids[i] for i in range(len(found.corners))], CORNER_COLUMNS, found)
+    by_it = [row for row in corners_json(frame) if name in row["by_method"]]
+    return encode([row | {"by_method": {name: row["by_method"][name]}} for row in by_it])
 
 
 @router.websocket("/stream")

@@ -185,18 +185,13 @@ def simulation() -> SimulationJson:
 def _live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> LiveSource:
     """The sensor; the one that plays has to let go of its port first, and gets it back if that fails."""
     playing = runtime.player.source
-    holder = (
-        playing
-        if isinstance(playing, LiveSource) and not options.emulated and playing.holds(options.port)
-        else None
-    )
-    if holder:
-        holder.close()
+    if options.emulated or not isinstance(playing, LiveSource) or not playing.holds(options.port):
+        return LiveSource(options, taps)
+    playing.close()
     try:
         return LiveSource(options, taps)
     except DeviceError:
-        if holder:
-            runtime.open(LiveSource(holder.options, taps))
+        runtime.open(LiveSource(playing.options, taps))
         raise
 
 
