@@ -67,7 +67,7 @@ def process(
             output,
             chosen.extraction,
             fitters or [chosen.extraction.fitter],
-            lambda so_far: count(so_far.scans),
+            count,
         )
     found = f"{plural(counts.segments, 'segment')} and {plural(counts.corners, 'corner')}"
     typer.echo(f"{output}: {found} of {plural(counts.scans, 'scan')}")

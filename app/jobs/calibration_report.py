@@ -1,6 +1,7 @@
 """What a calibration found, with what it means in words: the same for the command, REST and the page."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,39 +122,35 @@ def _differs(bands: Bands) -> bool:
     return bands.p_value < DIFFERENT
 
 
-def _on_sigma(name: str, sigma: Interval, *units: tuple[float, int, str]) -> list[str]:
+def _on_sigma(name: str, sigma: Interval, *units: tuple[float, int, str]) -> Iterator[str]:
     """A remark if sigma cannot be determined; each of the units with its factor and its digits."""
-    if sigma.low > 0:
-        return []
-    most = " or ".join(f"{_number(sigma.high, factor, digits)}{unit}" for factor, digits, unit in units)
-    return [f"The {name} noise cannot be determined here (at most {most}): keep the current setting."]
+    if sigma.low <= 0:
+        most = " or ".join(f"{_number(sigma.high, factor, digits)}{unit}" for factor, digits, unit in units)
+        yield f"The {name} noise cannot be determined here (at most {most}): keep the current setting."
 
 
-def _on_precision(found: Calibration) -> list[str]:
+def _on_precision(found: Calibration) -> Iterator[str]:
     """Which noise is not known to within 15 % yet, and how many scans that takes."""
     names = {
         "sigma_range": "range noise",
         "sigma_bearing": "bearing noise",
         "range_growth": "growth with range",
     }
-    short = {
-        names[name]: needed
+    parts = ", ".join(
+        f"{needed:,} for the {names[name]}"
         for name, needed in found.scans_needed.items()
         if needed is not None and needed > found.scans
-    }
-    if not short:
-        return []
-    parts = ", ".join(f"{needed:,} for the {name}" for name, needed in short.items())
-    return [f"To know each part to within 15 %, take more scans than these {found.scans}: {parts}."]
+    )
+    if parts:
+        yield f"To know each part to within 15 %, take more scans than these {found.scans}: {parts}."
 
 
-def _on_unevenness(size: Interval, assumed: float) -> list[str]:
-    if size.low > 0:
-        return []
-    return [
-        f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm. Since walls "
-        f"seldom are, {_number(assumed, 1e3, 1)} mm are assumed."
-    ]
+def _on_unevenness(size: Interval, assumed: float) -> Iterator[str]:
+    if size.low <= 0:
+        yield (
+            f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm. Since "
+            f"walls seldom are, {_number(assumed, 1e3, 1)} mm are assumed."
+        )
 
 
 def _on_ranges(found: Calibration) -> list[str]:
@@ -205,13 +202,12 @@ def _badly(how: str, fit: str, where: str) -> str:
     return f"Range noise {how}: {fit} badly; ellipses of corners {where} will be too small."
 
 
-def _on_drift(drift: float, sigma_range: Interval) -> list[str]:
-    if drift <= sigma_range.value:
-        return []
-    return [
-        f"A wall drifted by more than the noise, by {_number(drift, 1e3, 1)} mm: was something moving, or the sensor "
-        "still warming up?"
-    ]
+def _on_drift(drift: float, sigma_range: Interval) -> Iterator[str]:
+    if drift > sigma_range.value:
+        yield (
+            f"A wall drifted by more than the noise, by {_number(drift, 1e3, 1)} mm: was something moving, or the "
+            "sensor still warming up?"
+        )
 
 
 def _on_bias(bias: Interval | None) -> str:
