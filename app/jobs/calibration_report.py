@@ -10,6 +10,8 @@ from lidarcore.evaluation.calibration.result import Calibration
 from lidarcore.evaluation.calibration.variances import Bands
 from lidarcore.evaluation.intervals import Interval
 
+from ..records import record
+
 DIFFERENT = 0.01  # p-value below which bands are said to differ
 ONE = "one number fits"
 TELLING = 0.05  # m, half-width of the interval of a range bias beyond which it is not told
@@ -70,22 +72,14 @@ def report(found: Calibration) -> CalibrationReport:
     bias = found.range_bias
     if bias is not None and bias.half_width > TELLING:
         bias = None
-    return CalibrationReport(
-        noise=_noise(found),
-        sigma_range=found.sigma_range,
-        sigma_bearing=found.sigma_bearing,
-        range_growth=found.range_growth,
-        unevenness=found.unevenness,
-        unevenness_length=found.unevenness_length,
-        scans_needed=found.scans_needed,
+    sigmas = {name: found.told[name] for name in ("sigma_range", "sigma_bearing")}
+    return record(
+        CalibrationReport,
+        found,
+        noise=record(NoiseFound, found.noise, **sigmas),
         by_range=_bands(found.by_range),
         by_incidence=_bands(found.by_incidence),
-        outliers=found.outliers,
         range_bias=bias,
-        alignment=found.alignment,
-        drift=found.drift,
-        walls=found.walls,
-        beams=found.beams,
         remarks=(
             *_on_sigma("range", found.sigma_range, (1e3, 2, " mm")),
             *_on_sigma("bearing", found.sigma_bearing, (1e3, 2, " mrad"), (math.degrees(1), 3, "°")),
@@ -97,20 +91,6 @@ def report(found: Calibration) -> CalibrationReport:
             _on_bias(bias),
             _on_alignment(found.alignment),
         ),
-    )
-
-
-def _noise(found: Calibration) -> NoiseFound:
-    told, noise = found.told, found.noise
-    return NoiseFound(
-        told["sigma_range"],
-        told["sigma_bearing"],
-        noise.range_growth,
-        noise.unevenness,
-        noise.unevenness_length,
-        noise.tails,
-        noise.renewal,
-        noise.resampling,
     )
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 APP = Path(__file__).parents[2] / "app"
-BASE = {"errors", "isolation"}
+BASE = {"errors", "isolation", "records"}
 MAY_IMPORT = {
     "errors": set(),
     "isolation": set(),
+    "records": set(),
     "sources": BASE,
     "pipeline": BASE | {"sources"},
     "scene": BASE | {"sources", "pipeline"},

@@ -14,6 +14,7 @@ from ...pipeline.navigation import LocalizationStatus, Navigation
 from ...pipeline.runtime import Runtime
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
+from ...records import record
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Body as Model
@@ -101,16 +102,8 @@ def pose(server: Server) -> CurrentPoseJson:
     if localization is None:
         raise NotFoundError(f"There is no pose: {_why(server.runtime)}")
     found = localization.tracking
-    return {
-        "stamp": found.stamp,
-        "mode": found.mode,
-        "state": found.state,
-        "message": found.message,
-        **pose_json(found.estimate.pose),
-        "covariance": found.estimate.covariance.tolist(),
-        "nis": found.nis,
-        "dof": found.dof,
-    }
+    estimate = found.estimate
+    return record(CurrentPoseJson, found, **pose_json(estimate.pose), covariance=estimate.covariance.tolist())
 
 
 @router.post("/pose", response_description="The pose is set", responses=documented(409))

@@ -11,6 +11,7 @@ from typing_extensions import TypedDict
 from lidarcore import FITTERS
 from lidarcore.clusters import CLUSTERERS
 
+from ...records import record
 from ...scene.palette import METHOD_STYLES
 from ..openapi import formats
 from .dependencies import Server
@@ -66,26 +67,13 @@ class MethodsJson(TypedDict):
 
 METHODS: MethodsJson = {
     "fitters": [
-        {
-            "name": fitter.name,
-            "title": fitter.title,
-            "reference": fitter.reference,
-            "summary": fitter.summary,
-            "colour": METHOD_STYLES[fitter.name].dark,
-            "colour_light": METHOD_STYLES[fitter.name].light,
-            "dash": METHOD_STYLES[fitter.name].dash,
-        }
+        record(FitterJson, fitter, colour=style.dark, colour_light=style.light, dash=style.dash)
         for fitter in FITTERS.values()
+        for style in [METHOD_STYLES[fitter.name]]
     ],
     "clusterers": [
-        {
-            "name": clusterer.name,
-            "title": clusterer.title,
-            "reference": clusterer.reference,
-            "summary": clusterer.summary,
-            "parameters": [name for name in clusterer.parameters if name != "noise"],
-        }
-        for clusterer in CLUSTERERS.values()
+        record(ClustererJson, one, parameters=[name for name in one.parameters if name != "noise"])
+        for one in CLUSTERERS.values()
     ],
     "covariances": ["consistent", "published"],
 }

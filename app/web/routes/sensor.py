@@ -10,6 +10,7 @@ from lidarcore.body_mask import Sector
 from lidarcore.rplidar import FoundDevice, find_devices
 
 from ...errors import ConflictError
+from ...records import record
 from ...sources.live import LiveSource
 from ..problems import documented
 from ..schemas import StrictBody
@@ -81,13 +82,5 @@ def obey(server: Server, fault: Annotated[Fault, Body(examples=[{"command": "los
 
 
 def _found(device: FoundDevice) -> FoundDeviceJson:
-    return {
-        "path": device.path,
-        "description": device.description,
-        "vid_pid": device.vid_pid,
-        "looks_like": device.looks_like,
-        "name": device.info.name if device.info else None,
-        "serial": device.info.serial if device.info else None,
-        "error": device.error,
-        "in_use": device.in_use,
-    }
+    name, serial = (device.info.name, device.info.serial) if device.info else (None, None)
+    return record(FoundDeviceJson, device, name=name, serial=serial)

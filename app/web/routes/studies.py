@@ -9,6 +9,7 @@ from typing_extensions import TypedDict
 from ...jobs.studies import ExpectedTime, StudyStatus, expected
 from ...jobs.study_kinds import KINDS, Kind
 from ...jobs.study_reports import ReportEntry
+from ...records import record
 from ..problems import documented
 from .dependencies import Server
 
@@ -49,13 +50,12 @@ def read(server: Server) -> StudiesJson:
     """The studies there are with their options, what runs, and the reports of those that are finished."""
     run, reports = server.studies.run, server.studies.finished()
     kinds: list[KindJson] = [
-        {
-            "name": kind.name,
-            "title": kind.title,
-            "question": kind.question,
-            "expected_s": expected(kind.name, reports),
-            "schema": kind.options.model_json_schema(),
-        }
+        record(
+            KindJson,
+            kind,
+            expected_s=expected(kind.name, reports),
+            schema=kind.options.model_json_schema(),
+        )
         for kind in KINDS.values()
     ]
     return {"folder": str(server.studies.reports.folder), "kinds": kinds, "run": run, "reports": reports}
