@@ -13,9 +13,7 @@ from .options import MOST, Seed, Topic, Workers, check_folder, end_like_ctrl_c, 
 from .progress import ForPrograms, counted
 
 if TYPE_CHECKING:
-    from lidarcore import Scan
     from lidarcore.experiments.claim_rules import Claim
-    from lidarcore.experiments.environments import Design
 
 QUICK_RUNS = 2
 
@@ -65,18 +63,25 @@ def _add_corner_paper(name: str, about: str) -> None:
         for_programs: ForPrograms = False,
     ) -> None:
         check_folder(output)
-        from lidarcore import files
+        from lidarcore import files, open_recording
         from lidarcore.experiments.environments import Design
 
         paper, paper_claims, report = (
             import_module(f"lidarcore.experiments.{name}{part}") for part in ("", "_claims", "_report")
         )
-        usual = Design(seed=seed)
-        whole = replace(usual, split_threshold=getattr(paper, "THRESHOLD", usual.split_threshold))
-        design = _design(whole, scans, sigma_range, sigma_bearing, quick)
-        _tell_assumption(design, recording)
+        design = Design(seed=seed).with_noise(sigma_range, sigma_bearing)
+        design = replace(design, split_threshold=getattr(paper, "THRESHOLD", design.split_threshold))
+        if quick:
+            design = design.quick()
+        if scans is not None:
+            design = replace(design, scans=scans)
+        looked_at = None
+        if recording is not None:
+            looked_at = list(islice(open_recording(recording, topic), scans))
+            if design.assumption:
+                typer.echo(design.assumption)
         with counted(1 if recording else paper.PARTS, for_programs) as done:
-            result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
+            result = paper.run(design, workers or os.cpu_count() or 1, looked_at, done)
         files.write(output, report.html(result))
         _tell(output, paper_claims.claims(result))
 
@@ -116,26 +121,6 @@ def clustering_ekf(
         result = paper.run(design, workers or os.cpu_count() or 1, done)
     files.write(output, html(result))
     typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
-
-
-def _design(
-    design: "Design", scans: int | None, sigma_range: float | None, sigma_bearing: float | None, quick: bool
-) -> "Design":
-    design = design.with_noise(sigma_range, sigma_bearing)
-    if quick:
-        design = design.quick()
-    return design if scans is None else replace(design, scans=scans)
-
-
-def _read(recording: Path | None, topic: str | None, scans: int | None) -> "list[Scan] | None":
-    from lidarcore import open_recording
-
-    return None if recording is None else list(islice(open_recording(recording, topic), scans))
-
-
-def _tell_assumption(design: "Design", recording: Path | None) -> None:
-    if recording is not None and design.assumption:
-        typer.echo(design.assumption)
 
 
 def _tell(output: Path, claims: "list[Claim]") -> None:

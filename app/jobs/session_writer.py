@@ -45,7 +45,7 @@ class SessionWriter(ABC):
         atlas: Atlas,
         source: str,
         schedule: Callable[["SessionWriter", Waiting], None],
-        replay: Hashable = None,
+        replay: Hashable,
     ) -> None:
         self.replay = replay
         self._atlas, self._source, self._schedule, self._started = atlas, source, schedule, time.time()

@@ -12,7 +12,7 @@ def test_that_the_oldest_map_is_lost_where_too_many_wait_is_told(caplog) -> None
     disk, queue = threading.Event(), WriteQueue(lambda _: None, lambda _: None)
     for _ in range(MOST_RUNS + 2):  # one is being written
         waiting = Waiting(lambda final: disk.wait(PATIENCE) and None, ended=False, since=0.0)
-        queue.schedule(MapWriter(None, "a run", queue.schedule), waiting)
+        queue.schedule(MapWriter(None, "a run", queue.schedule, None), waiting)
     assert queue.error == "More than 8 maps waited to be written: the oldest is lost."
     assert queue.error in caplog.messages
     disk.set()
