@@ -14,7 +14,6 @@ from . import openapi, problems
 from .metrics import metrics_router
 from .routes import (
     calibration,
-    clusters,
     frame,
     grid,
     landmarks,
@@ -38,7 +37,7 @@ from .state import ServerOptions, State
 
 API = "/api/v1"
 ROUTES = (
-    frame, clusters, measure, localization, walls, grid, landmarks, map, sessions, repeatability, calibration, studies,
+    frame, measure, localization, walls, grid, landmarks, map, sessions, repeatability, calibration, studies,
     settings, source, sensor, recordings, recorder, selection, meta,
 )  # fmt: skip
 PAGES = {"/": "index.html", "/studies": "studies.html", "/guide": "guide.html", "/docs": "docs.html"}

@@ -1,19 +1,21 @@
-"""The current frame, its segments and its corners."""
+"""The current frame, its segments, its corners and its clusters."""
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, WebSocket
 from starlette.responses import Response
 
 from lidarcore import Features
+from lidarcore.clusters import CLUSTERERS, cluster
 
 from ...errors import NotFoundError
 from ...pipeline.frame import Frame
 from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns, csv_text, values
 from ..openapi import formats
 from ..problems import documented, encode
-from ..schemas import CornerJson, FrameJson, SegmentJson
-from ..serializers import corners_json, frame_text, segments_json
+from ..schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
+from ..serializers import clusters_json, corners_json, frame_text, segments_json
 from .dependencies import CurrentFrame, Server
 
 router = APIRouter(tags=["frame"], responses=documented(404, 422))
@@ -22,6 +24,10 @@ Fitter = Annotated[
     str | None, Query(description="a method of the frame; the main one if not given", examples=["ml"])
 ]
 Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with a header")]
+Method = Annotated[
+    str | None,
+    Query(description="a clustering method; the one of the settings if not given", examples=["dbscan"]),
+]
 Points = Annotated[bool, Query(description="with the measured points")]
 
 
@@ -59,6 +65,20 @@ def corners(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json")
         return _csv([ids[i] for i in range(len(found.corners))], CORNER_COLUMNS, found)
     by_it = [row for row in corners_json(frame) if name in row["by_method"]]
     return encode([row | {"by_method": {name: row["by_method"][name]}} for row in by_it])
+
+
+@router.get(
+    "/clusters",
+    response_model=list[ClusterJson],
+    response_description="The clusters of the newest scan",
+)
+def clusters(frame: CurrentFrame, method: Method = None) -> Response:
+    """The clusters of the newest scan, found when asked for. Metres, sensor frame."""
+    if method is not None and method not in CLUSTERERS:
+        raise NotFoundError(f"There is no clustering method {method!r}: choose from {', '.join(CLUSTERERS)}.")
+    wanted = frame.settings.clusters
+    chosen = replace(wanted, method=method or wanted.method)
+    return encode(clusters_json(cluster(frame.scan, chosen)))
 
 
 @router.websocket("/stream")
