@@ -84,11 +84,8 @@ def info(recording: RecordingPath, topic: Topic = None) -> None:
         typer.echo(f"{name:20} {value}")
 
 
-cli.command()(serve)
-cli.command()(calibrate)
-cli.command()(devices)
-cli.command()(record)
-cli.command()(localize)
+for command in (serve, calibrate, devices, record, localize):
+    cli.command()(command)
 cli.command("map")(map_recording)
 cli.add_typer(experiment, name="experiment")
 cli.add_typer(evaluate, name="evaluate")

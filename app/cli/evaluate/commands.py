@@ -170,13 +170,8 @@ def repeatability(
         repeatability_tables.write(summary, output)
 
 
-evaluate.command()(calibration)
-evaluate.command()(stations)
-evaluate.command()(agreement)
-evaluate.command()(honesty)
-evaluate.command()(endurance)
-evaluate.command()(relocation)
-evaluate.command()(walls)
+for command in (calibration, stations, agreement, honesty, endurance, relocation, walls):
+    evaluate.command()(command)
 
 
 def _noise(text: str) -> "SensorNoise":
