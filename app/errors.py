@@ -1,6 +1,7 @@
 """What can go wrong with what the application keeps; every message says what was found and what to do about it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 from lidarcore import LidarError
@@ -24,6 +25,15 @@ class TooLargeError(LidarError):
 
 class StorageError(LidarError):
     """The disk refused."""
+
+
+@contextmanager
+def storing(trouble: str) -> Iterator[None]:
+    """Turn what the disk refuses into a StorageError: the trouble, and why."""
+    try:
+        yield
+    except OSError as error:
+        raise StorageError(f"{trouble}: {error.strerror}.") from error
 
 
 class InvalidValues(Protocol):

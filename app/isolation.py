@@ -78,7 +78,7 @@ def _work(
 ) -> None:
     """The process: send (item, None, False) for each item, at last (None, error or None, True)."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that reads of us
-    _limit_memory()
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     end: Exception | None = None
     with suppress(BrokenPipeError):  # nobody wants more
         try:
@@ -91,7 +91,3 @@ def _work(
         except Exception as error:
             end = error
         sending.send((None, end, True))
-
-
-def _limit_memory() -> None:
-    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))

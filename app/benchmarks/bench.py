@@ -23,6 +23,7 @@ from lidarcore.evaluation.speed.landmarks import LIMIT_MS
 from lidarcore.evaluation.speed.mapping import MEDIAN_MS, P99_MS, time_front_end
 from lidarcore.evaluation.speed.repeatability import time_repeatability
 
+from ..cli.tables import table
 from .map_load import measure_map_queries
 from .repeatability_load import LIMIT_PERCENT, measure_repeatability
 from .server_load import Load, measure_load
@@ -197,10 +198,7 @@ def _age(load: Load, percentile: float, most: float) -> str:
 
 
 def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left")
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="right" if i else "left")
-    return table
+    return table(title, columns[:1], columns[1:])
 
 
 def _judged(text: str, good: bool) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import MOST, RecordingPath, Set, SettingsFile, Topic, check_folder, settings_from
+from .options import MOST, RecordingPath, Set, SettingsFile, Topic, check_folder, settings_from, to_file
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -36,10 +36,7 @@ DEGREES = math.degrees(1)
 def calibrate(
     recording: RecordingPath,
     output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o", "--output", help="FILE.json for the noise; other commands read it with --settings"
-        ),
+        Path | None, to_file("FILE.json for the noise; other commands read it with --settings")
     ] = None,
     skip: Annotated[int, typer.Option(min=0, max=MOST, help="scans to skip at the beginning")] = 0,
     scans: Annotated[
@@ -92,21 +89,13 @@ def _write(output: Path, result: "Calibration", usual: "SensorNoise") -> None:
     from ..jobs.profiles import Profile
 
     noise = result.noise_or(usual)
-    kept = [
-        f"{name} {1e3 * getattr(noise, name):g} {unit}"
-        for name, unit, told in zip(
-            ("sigma_range", "sigma_bearing"),
-            ("mm", "mrad"),
-            (result.told["sigma_range"], result.told["sigma_bearing"]),
-            strict=True,
-        )
-        if told is None
-    ]
+    kept = [name for name in ("sigma_range", "sigma_bearing") if result.told[name] is None]
     if len(kept) == 2:
         raise EvaluationError(f"Neither noise can be determined here, so {output} is not written.")
     files.write(output, Profile.of(noise).text)
-    if kept:
-        typer.echo(f"{output} keeps {kept[0]} of the settings: it cannot be determined here.", err=True)
+    for name in kept:
+        value = f"{name} {1e3 * getattr(noise, name):g} {'mm' if name == 'sigma_range' else 'mrad'}"
+        typer.echo(f"{output} keeps {value} of the settings: it cannot be determined here.", err=True)
 
 
 def _show(console: "Console", found: "CalibrationReport") -> None:

@@ -2,19 +2,18 @@
 
 import os
 from dataclasses import replace
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import MOST, Seed, Topic, Workers, check_folder, end_like_ctrl_c
+from .options import MOST, Seed, Topic, Workers, check_folder, end_like_ctrl_c, to_file
 from .progress import ForPrograms, counted
 
 if TYPE_CHECKING:
-    from lidarcore import Scan
     from lidarcore.experiments.claim_rules import Claim
-    from lidarcore.experiments.environments import Design
 
 QUICK_RUNS = 2
 
@@ -27,9 +26,7 @@ def begin() -> None:
     end_like_ctrl_c()
 
 
-Output = Annotated[
-    Path, typer.Option("-o", "--output", help="FILE.html for the report; replaced if it exists")
-]
+Output = Annotated[Path, to_file("FILE.html for the report; replaced if it exists")]
 Quick = Annotated[bool, typer.Option("--quick", help="only 100 scans of each room, to try it out")]
 Recording = Annotated[
     Path | None,
@@ -51,63 +48,52 @@ SigmaBearing = Annotated[
 ]
 
 
-@experiment.command()
-def cwlf(
-    output: Output = Path("cwlf.html"),
-    seed: Seed = 0,
-    scans: Scans = None,
-    recording: Recording = None,
-    topic: Topic = None,
-    sigma_range: SigmaRange = None,
-    sigma_bearing: SigmaBearing = None,
-    quick: Quick = False,
-    workers: Workers = None,
-    for_programs: ForPrograms = False,
-) -> None:
-    """Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time."""
-    check_folder(output)
-    from lidarcore import files
-    from lidarcore.experiments import cwlf as paper
-    from lidarcore.experiments.cwlf_claims import claims
-    from lidarcore.experiments.cwlf_report import html
-    from lidarcore.experiments.environments import Design
+def _add_corner_paper(name: str, about: str) -> None:
+    @experiment.command(name, help=about)
+    def repeat(
+        output: Output = Path(f"{name}.html"),
+        seed: Seed = 0,
+        scans: Scans = None,
+        recording: Recording = None,
+        topic: Topic = None,
+        sigma_range: SigmaRange = None,
+        sigma_bearing: SigmaBearing = None,
+        quick: Quick = False,
+        workers: Workers = None,
+        for_programs: ForPrograms = False,
+    ) -> None:
+        check_folder(output)
+        from lidarcore import files, open_recording
+        from lidarcore.experiments.environments import Design
 
-    design = _design(Design(seed=seed), scans, sigma_range, sigma_bearing, quick)
-    _tell_assumption(design, recording)
-    with counted(1 if recording else paper.PARTS, for_programs) as done:
-        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    files.write(output, html(result))
-    _tell(output, claims(result))
+        paper, paper_claims, report = (
+            import_module(f"lidarcore.experiments.{name}{part}") for part in ("", "_claims", "_report")
+        )
+        design = Design(seed=seed).with_noise(sigma_range, sigma_bearing)
+        design = replace(design, split_threshold=getattr(paper, "THRESHOLD", design.split_threshold))
+        if quick:
+            design = design.quick()
+        if scans is not None:
+            design = replace(design, scans=scans)
+        looked_at = None
+        if recording is not None:
+            looked_at = list(islice(open_recording(recording, topic), scans))
+            if design.assumption:
+                typer.echo(design.assumption)
+        with counted(1 if recording else paper.PARTS, for_programs) as done:
+            result = paper.run(design, workers or os.cpu_count() or 1, looked_at, done)
+        files.write(output, report.html(result))
+        _tell(output, paper_claims.claims(result))
 
 
-@experiment.command()
-def wctls(
-    output: Output = Path("wctls.html"),
-    seed: Seed = 0,
-    scans: Scans = None,
-    recording: Recording = None,
-    topic: Topic = None,
-    sigma_range: SigmaRange = None,
-    sigma_bearing: SigmaBearing = None,
-    quick: Quick = False,
-    workers: Workers = None,
-    for_programs: ForPrograms = False,
-) -> None:
-    """Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty."""
-    check_folder(output)
-    from lidarcore import files
-    from lidarcore.experiments import wctls as paper
-    from lidarcore.experiments.environments import Design
-    from lidarcore.experiments.wctls_claims import claims
-    from lidarcore.experiments.wctls_report import html
-
-    whole = Design(seed=seed, split_threshold=paper.THRESHOLD)
-    design = _design(whole, scans, sigma_range, sigma_bearing, quick)
-    _tell_assumption(design, recording)
-    with counted(1 if recording else paper.PARTS, for_programs) as done:
-        result = paper.run(design, workers or os.cpu_count() or 1, _read(recording, topic, scans), done)
-    files.write(output, html(result))
-    _tell(output, claims(result))
+_add_corner_paper(
+    "cwlf",
+    "Conditional weighted linear fitting: corners in two rooms, their claimed and true uncertainty, and time.",
+)
+_add_corner_paper(
+    "wctls",
+    "Weighted conformal total least squares: corners in two rooms, their claimed and true uncertainty.",
+)
 
 
 @experiment.command("clustering-ekf")
@@ -135,26 +121,6 @@ def clustering_ekf(
         result = paper.run(design, workers or os.cpu_count() or 1, done)
     files.write(output, html(result))
     typer.echo(f"{output}: {len(result.outcomes)} drives, runs x trajectories x methods")
-
-
-def _design(
-    design: "Design", scans: int | None, sigma_range: float | None, sigma_bearing: float | None, quick: bool
-) -> "Design":
-    design = design.with_noise(sigma_range, sigma_bearing)
-    if quick:
-        design = design.quick()
-    return design if scans is None else replace(design, scans=scans)
-
-
-def _read(recording: Path | None, topic: str | None, scans: int | None) -> "list[Scan] | None":
-    from lidarcore import open_recording
-
-    return None if recording is None else list(islice(open_recording(recording, topic), scans))
-
-
-def _tell_assumption(design: "Design", recording: Path | None) -> None:
-    if recording is not None and design.assumption:
-        typer.echo(design.assumption)
 
 
 def _tell(output: Path, claims: "list[Claim]") -> None:

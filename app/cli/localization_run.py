@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lidarcore import Array, RecordingError, Scan, extract
+from lidarcore import RecordingError, Scan, extract
 from lidarcore.clusters import cluster
-from lidarcore.files import replacing, write
+from lidarcore.files import replacing
 from lidarcore.landmarks import FORMATS, read_landmarks, write_landmarks
 from lidarcore.localization import Landmarks, Navigator, TrackingResult, from_stored, to_stored
 from lidarcore.mapping import MapPicture, WholeScans
@@ -16,7 +16,6 @@ from lidarcore.mapping.grid import read_ros_map
 from lidarcore.recordings import Recording
 
 from ..pipeline.settings import Settings
-from ..pipeline.tables import csv_text
 
 GRIDS = (".yaml", ".yml")
 
@@ -65,25 +64,16 @@ def tracker_in(path: Path | None, settings: Settings) -> Navigator | WholeScans:
         path = path / "map.yaml"
     if path.suffix.lower() in GRIDS:
         return WholeScans(settings.extraction, known=MapPicture(read_ros_map(path)), background=False)
-    format_of(path, GRIDS)
-    return Navigator(replace(settings.navigation, mode="localize"), read_map(path))
-
-
-def read_map(path: Path) -> Landmarks:
-    """The landmarks of a file (.json, .csv, .geojson). Raises LandmarkMapError or OSError."""
+    format = format_of(path, GRIDS)
     with path.open(encoding="utf-8-sig", newline="") as file:
-        return from_stored(read_landmarks(file, format_of(path)))
+        known = from_stored(read_landmarks(file, format))
+    return Navigator(replace(settings.navigation, mode="localize"), known)
 
 
 def write_map(path: Path, landmarks: Landmarks, method: str) -> None:
     """The confirmed landmarks; the file appears when complete."""
     with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
         write_landmarks(to_stored(landmarks, method), file, format_of(path))
-
-
-def write_poses(path: Path, outcome: Outcome) -> None:
-    """The poses as CSV; the file appears when complete."""
-    write(path, csv_text(outcome.columns))
 
 
 def format_of(path: Path, others: Sequence[str] = ()) -> str:
@@ -104,10 +94,5 @@ def _step(tracker: Navigator | WholeScans, scan: Scan, settings: Settings) -> Tr
 
 
 def _row(found: TrackingResult) -> tuple[object, ...]:
-    estimate = found.estimate
-    where = _uncertain(estimate.pose, estimate.covariance)
-    return (found.stamp, found.state, *where, len(found.pairs), found.nis, found.dof)
-
-
-def _uncertain(pose: Array, covariance: Array) -> tuple[float, ...]:
-    return (*pose.tolist(), *covariance[np.triu_indices(3)].tolist())
+    pose, covariance = found.estimate.pose.tolist(), found.estimate.covariance[np.triu_indices(3)].tolist()
+    return (found.stamp, found.state, *pose, *covariance, len(found.pairs), found.nis, found.dof)

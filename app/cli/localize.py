@@ -5,12 +5,13 @@ from typing import Annotated
 
 import typer
 
-from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, counting, plural, settings_from
+from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, plural, settings_from, to_file
+from .progress import counting
 
 
 def localize(
     recording: RecordingPath,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="FILE.csv for the poses")] = None,
+    output: Annotated[Path | None, to_file("FILE.csv for the poses")] = None,
     known: Annotated[
         Path | None,
         typer.Option(
@@ -33,9 +34,10 @@ def localize(
     """Track the sensor through a recording, in a known map or in one of landmarks that is built on the way."""
     if known is not None and save_map is not None:
         raise typer.BadParameter("give --map or --save-map: a known map stays as it is.")
-    from lidarcore import open_recording
+    from lidarcore import files, open_recording
 
-    from .localization_run import format_of, track, tracker_in, write_map, write_poses
+    from ..pipeline.tables import csv_text
+    from .localization_run import format_of, track, tracker_in, write_map
 
     chosen = settings_from(settings, set_)
     if output is not None:
@@ -47,7 +49,7 @@ def localize(
     with counting("scans") as count:
         outcome = track(open_recording(recording, topic, chosen.sensor.mask), tracker, chosen, count)
     if output is not None:
-        write_poses(output, outcome)
+        files.write(output, csv_text(outcome.columns))
     if save_map is not None and outcome.landmarks is not None:
         write_map(save_map, outcome.landmarks, chosen.landmark_method)
     found = (

@@ -9,12 +9,12 @@ import typer
 
 from .calibrate import calibrate
 from .devices import devices
-from .emulate import PASS_ON, emulate
 from .evaluate import evaluate
 from .experiment import experiment
 from .localize import localize
 from .map import map_recording
-from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, counting, plural, settings_from
+from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, plural, settings_from, to_file
+from .progress import counting
 from .record import record
 from .serve import serve
 
@@ -47,7 +47,7 @@ def common(
 @cli.command()
 def process(
     recording: RecordingPath,
-    output: Annotated[Path, typer.Option("-o", "--output", help="FILE.csv, FILE.parquet or FILE.geojson")],
+    output: Annotated[Path, to_file("FILE.csv, FILE.parquet or FILE.geojson")],
     topic: Topic = None,
     fitter: Annotated[list[str] | None, typer.Option(help="a method; may be repeated to compare")] = None,
     settings: SettingsFile = None,
@@ -67,7 +67,7 @@ def process(
             output,
             chosen.extraction,
             fitters or [chosen.extraction.fitter],
-            lambda so_far: count(so_far.scans),
+            count,
         )
     found = f"{plural(counts.segments, 'segment')} and {plural(counts.corners, 'corner')}"
     typer.echo(f"{output}: {found} of {plural(counts.scans, 'scan')}")
@@ -84,15 +84,22 @@ def info(recording: RecordingPath, topic: Topic = None) -> None:
         typer.echo(f"{name:20} {value}")
 
 
-cli.command()(serve)
-cli.command()(calibrate)
-cli.command()(devices)
-cli.command()(record)
-cli.command()(localize)
+for command in (serve, calibrate, devices, record, localize):
+    cli.command()(command)
 cli.command("map")(map_recording)
 cli.add_typer(experiment, name="experiment")
 cli.add_typer(evaluate, name="evaluate")
-cli.command(add_help_option=False, context_settings=PASS_ON)(emulate)
+
+
+# The emulator reads its options, and explains them, itself.
+@cli.command(
+    add_help_option=False, context_settings={"ignore_unknown_options": True, "allow_extra_args": True}
+)
+def emulate(context: typer.Context) -> None:
+    """Emulate an RPLIDAR S1 on a pseudo-terminal; --help lists what can be set."""
+    from lidarcore.rplidar.emulator import main
+
+    main(context.args, program="lidarcore emulate")
 
 
 @cli.command()

@@ -11,10 +11,10 @@ from .options import (
     SettingsFile,
     Topic,
     check_new_folder,
-    counting,
     plural,
     settings_from,
 )
+from .progress import counting
 
 
 def map_recording(

@@ -3,8 +3,7 @@
 import errno
 import json
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,17 +11,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from ..pipeline.settings import Settings
 
 RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
 Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
+TopicOfAll = Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")]
 MOST = 1_000_000_000  # of whatever is counted: more than any recording holds
 
 Seed = Annotated[int, typer.Option(min=0, max=MOST, help="seed of the random numbers")]
 Workers = Annotated[
     int | None, typer.Option(min=1, max=1024, help="processes; one for each core if not given")
+]
+Given = Annotated[
+    bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
 ]
 Set = Annotated[
     list[str] | None,
@@ -36,6 +37,11 @@ SettingsFile = Annotated[
         "rplidar_a1_a2, for its noise",
     ),
 ]
+
+
+def to_file(help: str) -> Any:
+    """The option -o, --output of a command that writes a file; `help` says which."""
+    return typer.Option("-o", "--output", help=help)
 
 
 def end_like_ctrl_c() -> None:
@@ -90,14 +96,6 @@ def check_output(file: Path | None, *formats: str) -> None:
         check_folder(file)
 
 
-def console(width: int) -> "Console":
-    """The terminal; a file or a pipe is as wide as the tables need."""
-    from rich.console import Console
-
-    terminal = Console()
-    return terminal if terminal.is_terminal else Console(width=width)
-
-
 def numbers(option: str, text: str, meaning: str, example: str) -> list[float]:
     """As many numbers as the example has, separated by commas. Raises BadParameter."""
     with suppress(ValueError):
@@ -105,19 +103,6 @@ def numbers(option: str, text: str, meaning: str, example: str) -> list[float]:
         if len(found) == len(example.split(",")):
             return found
     raise typer.BadParameter(f"{option} {text!r} should be {meaning}: {example}.")
-
-
-@contextmanager
-def counting(what: str) -> Iterator[Callable[[int], None]]:
-    """A bar on a terminal that shows how many there have been so far."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    columns = (BarColumn(), TextColumn(f"{{task.completed}} {what}"), TimeElapsedColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda number: bar.update(task, completed=number)
 
 
 def settings_from(file: Path | None, assignments: list[str] | None) -> "Settings":

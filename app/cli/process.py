@@ -106,11 +106,11 @@ def process(
     output: Path,
     settings: ExtractionSettings,
     fitters: Sequence[str],
-    progress: Callable[[Counts], None],
+    progress: Callable[[int], None],
 ) -> Counts:
     """Extract every scan by every fitter and write the table; the file appears when complete, or not at all.
 
-    `progress` is called after every scan. Raises RecordingError for a bad recording or an unknown suffix.
+    `progress` is told the number of scans. Raises RecordingError for a bad recording or an unknown suffix.
     """
     suffix = output.suffix.lower()
     if suffix not in WRITERS:
@@ -127,7 +127,7 @@ def process(
                 counts.segments += len(features.segments)
                 counts.corners += len(features.corners)
             counts.scans += 1
-            progress(counts)
+            progress(counts.scans)
             if counts.scans % BATCH == 0:
                 writer.write(batch.table())
                 batch = _Batch()

@@ -6,11 +6,14 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import count
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..jobs.study_process import PROGRESS
+
+if TYPE_CHECKING:
+    from rich.progress import ProgressColumn
 
 ForPrograms = Annotated[
     bool,
@@ -24,7 +27,10 @@ ForPrograms = Annotated[
 @contextmanager
 def progress(total: int, for_programs: bool = False) -> Iterator[Callable[[int], None]]:
     """Call what it gives with the number of parts that are done."""
-    with _lines(total) if for_programs else _bar(total) as tell:
+    from rich.progress import MofNCompleteColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    bar = _bar(total, MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
+    with _lines(total) if for_programs else bar as tell:
         yield tell
 
 
@@ -34,6 +40,15 @@ def counted(total: int, for_programs: bool = False) -> Iterator[Callable[[], Non
     with progress(total, for_programs) as tell:
         numbers = count(1)
         yield lambda: tell(next(numbers))
+
+
+@contextmanager
+def counting(what: str) -> Iterator[Callable[[int], None]]:
+    """Call what it gives with the number of them so far, where nobody knows how many there will be."""
+    from rich.progress import TextColumn, TimeElapsedColumn
+
+    with _bar(None, TextColumn(f"{{task.completed}} {what}"), TimeElapsedColumn()) as tell:
+        yield tell
 
 
 @contextmanager
@@ -55,13 +70,14 @@ def _end_with_input() -> None:
 
 
 @contextmanager
-def _bar(total: int) -> Iterator[Callable[[int], None]]:
-    """A bar, if there is a terminal."""
+def _bar(total: int | None, *columns: "ProgressColumn") -> Iterator[Callable[[int], None]]:
+    """A bar, and what else is to be told of it, if there is a terminal."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress
 
     console = Console(stderr=True)
-    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(
+        BarColumn(), *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
         task = bar.add_task("", total=total)
         yield lambda done: bar.update(task, completed=done)

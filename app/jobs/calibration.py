@@ -124,7 +124,9 @@ class LiveCalibration:
         """Scans of one source say nothing on another one's noise: a change of it ends the collection."""
         with self._lock:
             if self._job.state == "collecting" and self._player.source is not self._job.source:
-                _fail(self._job, "The source was changed while scans were collected: start again.")
+                self._job.state = "failed"
+                self._job.message = "The source was changed while scans were collected: start again."
+                self._job.scans.clear()
 
     def status(self) -> CalibrationStatus:
         """How far it is, and what was found."""
@@ -142,21 +144,14 @@ class LiveCalibration:
         return None
 
     def _calculate(self, job: _Job) -> None:
+        result, message = None, None
         try:
             result = report(calibrate(job.scans.values()))
         except LidarError as error:
-            with self._lock:
-                _fail(job, str(error))
+            message = str(error)
         except Exception:
             logger.exception("calibration of %s", job.name)
-            with self._lock:
-                _fail(job, "The calibration failed because of an error in the server; see its log.")
-        else:
-            with self._lock:
-                job.state, job.result = "done", result
-                job.scans.clear()
-
-
-def _fail(job: _Job, message: str) -> None:
-    job.state, job.message = "failed", message
-    job.scans.clear()
+            message = "The calibration failed because of an error in the server; see its log."
+        with self._lock:
+            job.state, job.result, job.message = "done" if result else "failed", result, message
+            job.scans.clear()

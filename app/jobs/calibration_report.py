@@ -1,6 +1,7 @@
 """What a calibration found, with what it means in words: the same for the command, REST and the page."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,6 +9,8 @@ import numpy as np
 from lidarcore.evaluation.calibration.result import Calibration
 from lidarcore.evaluation.calibration.variances import Bands
 from lidarcore.evaluation.intervals import Interval
+
+from ..records import record
 
 DIFFERENT = 0.01  # p-value below which bands are said to differ
 ONE = "one number fits"
@@ -69,22 +72,14 @@ def report(found: Calibration) -> CalibrationReport:
     bias = found.range_bias
     if bias is not None and bias.half_width > TELLING:
         bias = None
-    return CalibrationReport(
-        noise=_noise(found),
-        sigma_range=found.sigma_range,
-        sigma_bearing=found.sigma_bearing,
-        range_growth=found.range_growth,
-        unevenness=found.unevenness,
-        unevenness_length=found.unevenness_length,
-        scans_needed=found.scans_needed,
+    sigmas = {name: found.told[name] for name in ("sigma_range", "sigma_bearing")}
+    return record(
+        CalibrationReport,
+        found,
+        noise=record(NoiseFound, found.noise, **sigmas),
         by_range=_bands(found.by_range),
         by_incidence=_bands(found.by_incidence),
-        outliers=found.outliers,
         range_bias=bias,
-        alignment=found.alignment,
-        drift=found.drift,
-        walls=found.walls,
-        beams=found.beams,
         remarks=(
             *_on_sigma("range", found.sigma_range, (1e3, 2, " mm")),
             *_on_sigma("bearing", found.sigma_bearing, (1e3, 2, " mrad"), (math.degrees(1), 3, "°")),
@@ -99,20 +94,6 @@ def report(found: Calibration) -> CalibrationReport:
     )
 
 
-def _noise(found: Calibration) -> NoiseFound:
-    told, noise = found.told, found.noise
-    return NoiseFound(
-        told["sigma_range"],
-        told["sigma_bearing"],
-        noise.range_growth,
-        noise.unevenness,
-        noise.unevenness_length,
-        noise.tails,
-        noise.renewal,
-        noise.resampling,
-    )
-
-
 def _bands(bands: Bands) -> BandsReport:
     return BandsReport(tuple(bands.edges), tuple(bands.sigmas), bands.p_value, _differs(bands))
 
@@ -121,39 +102,35 @@ def _differs(bands: Bands) -> bool:
     return bands.p_value < DIFFERENT
 
 
-def _on_sigma(name: str, sigma: Interval, *units: tuple[float, int, str]) -> list[str]:
+def _on_sigma(name: str, sigma: Interval, *units: tuple[float, int, str]) -> Iterator[str]:
     """A remark if sigma cannot be determined; each of the units with its factor and its digits."""
-    if sigma.low > 0:
-        return []
-    most = " or ".join(f"{_number(sigma.high, factor, digits)}{unit}" for factor, digits, unit in units)
-    return [f"The {name} noise cannot be determined here (at most {most}): keep the current setting."]
+    if sigma.low <= 0:
+        most = " or ".join(f"{_number(sigma.high, factor, digits)}{unit}" for factor, digits, unit in units)
+        yield f"The {name} noise cannot be determined here (at most {most}): keep the current setting."
 
 
-def _on_precision(found: Calibration) -> list[str]:
+def _on_precision(found: Calibration) -> Iterator[str]:
     """Which noise is not known to within 15 % yet, and how many scans that takes."""
     names = {
         "sigma_range": "range noise",
         "sigma_bearing": "bearing noise",
         "range_growth": "growth with range",
     }
-    short = {
-        names[name]: needed
+    parts = ", ".join(
+        f"{needed:,} for the {names[name]}"
         for name, needed in found.scans_needed.items()
         if needed is not None and needed > found.scans
-    }
-    if not short:
-        return []
-    parts = ", ".join(f"{needed:,} for the {name}" for name, needed in short.items())
-    return [f"To know each part to within 15 %, take more scans than these {found.scans}: {parts}."]
+    )
+    if parts:
+        yield f"To know each part to within 15 %, take more scans than these {found.scans}: {parts}."
 
 
-def _on_unevenness(size: Interval, assumed: float) -> list[str]:
-    if size.low > 0:
-        return []
-    return [
-        f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm. Since walls "
-        f"seldom are, {_number(assumed, 1e3, 1)} mm are assumed."
-    ]
+def _on_unevenness(size: Interval, assumed: float) -> Iterator[str]:
+    if size.low <= 0:
+        yield (
+            f"The walls may as well be straight: their unevenness is at most {_number(size.high, 1e3, 1)} mm. Since "
+            f"walls seldom are, {_number(assumed, 1e3, 1)} mm are assumed."
+        )
 
 
 def _on_ranges(found: Calibration) -> list[str]:
@@ -205,13 +182,12 @@ def _badly(how: str, fit: str, where: str) -> str:
     return f"Range noise {how}: {fit} badly; ellipses of corners {where} will be too small."
 
 
-def _on_drift(drift: float, sigma_range: Interval) -> list[str]:
-    if drift <= sigma_range.value:
-        return []
-    return [
-        f"A wall drifted by more than the noise, by {_number(drift, 1e3, 1)} mm: was something moving, or the sensor "
-        "still warming up?"
-    ]
+def _on_drift(drift: float, sigma_range: Interval) -> Iterator[str]:
+    if drift > sigma_range.value:
+        yield (
+            f"A wall drifted by more than the noise, by {_number(drift, 1e3, 1)} mm: was something moving, or the "
+            "sensor still warming up?"
+        )
 
 
 def _on_bias(bias: Interval | None) -> str:

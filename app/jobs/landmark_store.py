@@ -14,10 +14,9 @@ from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
 from .map_file import grid_of, landmarks_of
-from .map_writer import MapChange, MapWriter
-from .stored_grids import grid_from_stored, grid_to_stored
-from .stored_run import LandmarkRun, StoredRun, WallRun
-from .wall_writer import WallWriter, from_stored
+from .map_writer import MapWriter
+from .session_writer import MapChange, SessionWriter
+from .wall_writer import WallWriter, from_stored, grid_from_stored, grid_to_stored
 from .write_queue import WriteQueue
 
 PATIENCE = 2.0  # s to wait while another process writes
@@ -47,7 +46,7 @@ class LandmarkStore:
         """Open, or make, the file. Raises LandmarkMapError."""
         self.atlas = Atlas(url, PATIENCE)
         self.listeners: list[Callable[[MapChange], None]] = []
-        self._run: StoredRun | None = None
+        self._run: SessionWriter | None = None
         self._used: int | None = None
         self._finished: dict[Hashable, int] = {}  # by what is replayed, the session of its last finished map
         self._queue = WriteQueue(self._tell, self._replace_earlier)
@@ -75,19 +74,19 @@ class LandmarkStore:
         """The session that is written, or used; None if there is none yet."""
         return self._run.session if self._run else self._used
 
-    def begin(self, source: str, replay: Hashable = None) -> LandmarkRun:
+    def begin(self, source: str, replay: Hashable = None) -> SessionWriter:
         """A run begins with an empty map of its own, and the one before ends.
 
         Of runs with the same `replay`, which lead to the same map, the last one that was finished is kept.
         """
         self.use(None)
-        self._run = run = LandmarkRun(MapWriter(self.atlas, source, "slam"), self._queue.schedule, replay)
+        self._run = run = MapWriter(self.atlas, source, self._queue.schedule, replay)
         return run
 
-    def begin_walls(self, source: str, replay: Hashable = None) -> WallRun:
+    def begin_walls(self, source: str, replay: Hashable = None) -> SessionWriter:
         """A run begins with an empty map of walls of its own, and the one before ends; `replay` is as in `begin`."""
         self.use(None)
-        self._run = run = WallRun(WallWriter(self.atlas, source, "slam"), self._queue.schedule, replay)
+        self._run = run = WallWriter(self.atlas, source, self._queue.schedule, replay)
         return run
 
     def walls(self, session: int) -> WallTable:
@@ -146,7 +145,7 @@ class LandmarkStore:
         """The newest session to localize in."""
         return self.atlas.newest_to_localize_in()
 
-    def _replace_earlier(self, run: StoredRun) -> None:
+    def _replace_earlier(self, run: SessionWriter) -> None:
         """Give up the map of the run before with the same `replay`, unless it is in use."""
         if run.replay is None or run.session is None:
             return

@@ -1,16 +1,16 @@
 """What of a running map is on the disk, and what should be: the landmarks that changed enough to be written again."""
 
-import time
-from collections.abc import Container, Mapping
-from dataclasses import dataclass
+from collections.abc import Container
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.errors import UnknownLandmarkError, UnknownSessionError
-from lidarcore.landmarks import Atlas, Landmark, LandmarkMap
+from lidarcore.landmarks import Landmark
 from lidarcore.localization import Landmarks
+
+from .session_writer import MapChange, SessionWriter
 
 MOVED = 0.25  # sigma: a landmark that moved so far since it was written is written again,
 RESIZED = 0.1  # and one whose variance has changed by this part,
@@ -32,31 +32,13 @@ _TABLE = np.dtype(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class MapChange:
-    """What was written: landmarks as they are on the disk now, with their ids there, and ids that were taken out."""
+class MapWriter(SessionWriter):
+    """Writes the confirmed landmarks of a run."""
 
-    session: int
-    landmarks: tuple[Landmark, ...]
-    removed: tuple[int, ...]
+    _written: Table = np.empty(0, _TABLE)
 
-
-class MapWriter:
-    """Writes the confirmed landmarks of one run into a session of their own, which begins with the first of them."""
-
-    def __init__(self, atlas: Atlas, source: str, mode: str) -> None:
-        self.ids: Mapping[int, int] = {}
-        self._atlas, self._source, self._mode, self._started = atlas, source, mode, time.time()
-        self._map: LandmarkMap | None = None
-        self._written = np.empty(0, _TABLE)
-
-    @property
-    def session(self) -> int | None:
-        """The id of the session; None before anything is on the disk."""
-        return self._map.session if self._map else None
-
-    def write(self, landmarks: Landmarks, method: str, final: bool) -> MapChange | None:
-        """Bring the disk up to date with the map: in what changed enough, or in everything at the end of the run.
+    def write(self, landmarks: Landmarks, method: str = "", *, final: bool) -> MapChange | None:
+        """Write what changed enough, or everything if it is final; `method` is what found the landmarks.
 
         What was written, None if there was nothing to write. Raises LandmarkMapError; nothing has changed then.
         """
@@ -72,21 +54,15 @@ class MapWriter:
         self._written = np.concatenate([kept, now[is_due]])
         return change
 
-    def end(self) -> None:
-        """Note in the file that the run has ended. Raises LandmarkMapError."""
-        if self._map:
-            self._atlas.end(self._map.session, time.time())
-
     def _put(self, rows: Table, gone: list[int]) -> MapChange:
         """Write rows, and take out the landmarks with these ids of the navigator."""
-        if self._map is None:
-            self._map = self._atlas.begin(self._source, self._started, self._mode)
+        begun = self._begun()
         marks = [Landmark(*(*values, self.ids.get(id))) for *values, id in rows.tolist()]
         removed = tuple(self.ids[id] for id in gone)
         try:
-            stored = self._map.put(marks, without=removed)
+            stored = begun.put(marks, without=removed)
         except UnknownLandmarkError:
-            self._keep({landmark.id for landmark in self._map})
+            self._keep({landmark.id for landmark in begun})
             raise
         except UnknownSessionError:
             self._keep(set())
@@ -95,9 +71,8 @@ class MapWriter:
         ids = dict(zip(rows["id"].tolist(), stored, strict=True))
         self.ids = {id: known for id, known in self.ids.items() if id not in gone} | ids
         written = zip(rows.tolist(), stored, strict=True)
-        return MapChange(
-            self._map.session, tuple(Landmark(*(*values, id)) for (*values, _), id in written), removed
-        )
+        landmarks = tuple(Landmark(*(*values, id)) for (*values, _), id in written)
+        return MapChange(begun.session, landmarks, removed)
 
     def _keep(self, left: Container[int | None]) -> None:
         """Forget which landmarks are in the file but these ids: someone deleted the others, which are written again."""

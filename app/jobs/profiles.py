@@ -10,7 +10,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from lidarcore import LidarError, SensorNoise, files
 
-from ..errors import ConflictError, InvalidNameError, NotFoundError, StorageError, explained
+from ..errors import ConflictError, InvalidNameError, NotFoundError, explained, storing
 from ..sources.library import PLAIN_NAME, checked_name
 
 SUFFIX = ".json"
@@ -104,11 +104,9 @@ class Profiles:
                 raise ConflictError(
                     f"A profile named {name!r} already exists: replace it or choose another name."
                 )
-            try:
+            with storing("The profile could not be saved"):
                 self.folder.mkdir(parents=True, exist_ok=True)
                 files.write(path, profile.text)
-            except OSError as error:
-                raise StorageError(f"The profile could not be saved: {error.strerror}.") from error
         return ProfileEntry(name, profile.noise)
 
     def delete(self, name: str) -> None:

@@ -1,6 +1,5 @@
 """Repeatability beside the live view: every new scan by all methods, while the sensor stands still."""
 
-import logging
 import threading
 from dataclasses import replace
 from typing import NamedTuple
@@ -13,11 +12,6 @@ from lidarcore.threads import FailureLog
 
 from ..pipeline.frame import Frame
 from ..sources.timed_scan import TimedScan
-from .spooler import Spooler
-
-WAITING = 10  # scans; each takes about a millisecond
-
-logger = logging.getLogger(__name__)
 
 
 class _Kind(NamedTuple):
@@ -30,44 +24,29 @@ class _Kind(NamedTuple):
 
 
 class LiveRepeatability:
-    """Is told of every frame, and works on its scan in a thread of its own, started when it is first wanted.
-
-    Any thread may call any method, but only one may tell.
-    """
+    """Is told of every frame by one thread, which takes half a millisecond; any may ask."""
 
     def __init__(self) -> None:
-        self._spooler: Spooler[tuple[int, Frame]] | None = None
         self._running = False
         self._study = Repeatability()
         self._kind: _Kind | None = None
         self._last: TimedScan | None = None
         self._adding = FailureLog("scan %s could not be compared")
-        self._begun = 0  # times it started over; scans told of before that are dropped
         self._lock = threading.Lock()
 
     def observe(self, frame: Frame) -> None:
-        """Work on the scan of this frame if the settings want that. What was found stays until they want it again."""
+        """Take the scan of this frame if the settings want that. What was found stays until they want it again."""
         running, before = frame.settings.repeatability.running, self._running
         self._running = running
-        if not running:
-            return
-        if not before:
+        if running and not before:
             self.clear()
-        if self._spooler is None:
-            self._spooler = Spooler(WAITING, self._work, _nothing, _nothing, logger.error)
-            self._spooler.start()
-        self._spooler.put((self._begun, frame))
-
-    def close(self) -> None:
-        """End the thread."""
-        if self._spooler is not None:
-            self._spooler.end()
-            self._spooler.join()
+        if running:
+            with self._adding(frame.timed.position), self._lock:
+                self._add(frame)
 
     def clear(self) -> None:
-        """Start over, without the scans that still wait."""
+        """Start over."""
         with self._lock:
-            self._begun += 1
             self._study.clear()
             self._last = None
 
@@ -86,27 +65,16 @@ class LiveRepeatability:
         with self._lock:
             return self._study.wall_deviations(wall)
 
-    def _work(self, item: tuple[int, Frame]) -> None:
-        begun, frame = item
-        with self._adding(frame.timed.position):
-            self._add(begun, frame)
-
-    def _add(self, begun: int, frame: Frame) -> None:
+    def _add(self, frame: Frame) -> None:
         kind = _kind(frame)
-        with self._lock:
-            if begun != self._begun:
-                return
-            if kind != self._kind:
-                self._study, self._kind, self._last = Repeatability(kind.window), kind, None
-            elif _leaps(self._last, frame.timed):
-                self._study.clear()
-            elif not _follows(self._last, frame.timed):
-                return
-            self._last = frame.timed
-        features = compare(frame.timed.scan, kind.extraction)
-        with self._lock:
-            if begun == self._begun:
-                self._study.add(features)
+        if kind != self._kind:
+            self._study, self._kind = Repeatability(kind.window), kind
+        elif _leaps(self._last, frame.timed):
+            self._study.clear()
+        elif not _follows(self._last, frame.timed):
+            return
+        self._last = frame.timed
+        self._study.add(compare(frame.timed.scan, kind.extraction))
 
 
 def _kind(frame: Frame) -> _Kind:
@@ -129,6 +97,3 @@ def _leaps(last: TimedScan | None, now: TimedScan) -> bool:
         return False
     by = now.position.index - last.position.index
     return by < 0 or (by > 1 and now.seeks != last.seeks)
-
-
-def _nothing() -> None: ...

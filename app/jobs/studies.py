@@ -12,6 +12,7 @@ from typing import Any, Literal
 from lidarcore import SensorNoise
 
 from ..errors import ConflictError, NotFoundError
+from ..records import record
 from .study_kinds import KINDS, Options
 from .study_process import StudyProcess
 from .study_reports import ReportEntry, Reports
@@ -65,15 +66,13 @@ class _Study:
         done, total = (self.process.done, self.process.total) if self.process else (0, 0)
         share = done / total if total else 0.0
         is_known = self.state == "running" and share > MIN_SHARE
-        return StudyStatus(
-            kind=self.kind,
-            options=self.options,
-            state=self.state,
+        return record(
+            StudyStatus,
+            self,
             elapsed_s=round(self.elapsed, 1),
             remaining_s=round(self.elapsed * (1 - share) / share, 1) if is_known else None,
             done=done,
             total=total,
-            error=self.error,
             report=self.path.stem if self.state == "finished" else None,
         )
 

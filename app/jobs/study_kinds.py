@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -49,17 +49,16 @@ class CornerOptions(Options):
 
     def arguments(self, noise: SensorNoise, path: Callable[[str], Path]) -> list[str]:
         scans = QUICK_SCANS if self.scans is None and self.quick and self.recording else self.scans
-        return [
-            *(["--quick"] if self.quick else []),
-            *([f"--scans={scans}"] if scans is not None else []),
-            *([f"--recording={path(self.recording).absolute()}"] if self.recording is not None else []),
-            *([f"--topic={self.topic}"] if self.topic is not None else []),
-            *(
-                [f"--sigma-range={noise.sigma_range}", f"--sigma-bearing={noise.sigma_bearing}"]
-                if self.noise == "settings"
-                else []
-            ),
-        ]
+        recording = None if self.recording is None else path(self.recording).absolute()
+        set_now = self.noise == "settings"
+        return _arguments(
+            quick=self.quick,
+            scans=scans,
+            recording=recording,
+            topic=self.topic,
+            sigma_range=noise.sigma_range if set_now else None,
+            sigma_bearing=noise.sigma_bearing if set_now else None,
+        )
 
 
 class DriveOptions(Options):
@@ -70,8 +69,7 @@ class DriveOptions(Options):
     )
 
     def arguments(self, noise: SensorNoise, path: Callable[[str], Path]) -> list[str]:
-        runs = [f"--runs={self.runs}"] if self.runs is not None else []
-        return [*(["--quick"] if self.quick else []), *runs]
+        return _arguments(quick=self.quick, runs=self.runs)
 
 
 class ConsistencyOptions(Options):
@@ -89,15 +87,19 @@ class ConsistencyOptions(Options):
 
     def arguments(self, noise: SensorNoise, path: Callable[[str], Path]) -> list[str]:
         trials = self.trials or (QUICK_TRIALS if self.quick else FULL_TRIALS)
-        noise_arguments = (
-            [f"--noise={noise.sigma_range},{noise.sigma_bearing}"] if self.noise == "settings" else []
-        )
-        return [f"--trials={trials}", *noise_arguments]
+        set_now = f"{noise.sigma_range},{noise.sigma_bearing}" if self.noise == "settings" else None
+        return _arguments(trials=trials, noise=set_now)
+
+
+def _arguments(*, quick: bool = False, **options: object) -> list[str]:
+    """Arguments of the command: --name=value of each option that is not None."""
+    given = {name.replace("_", "-"): value for name, value in options.items() if value is not None}
+    return ["--quick"] * quick + [f"--{name}={value}" for name, value in given.items()]
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A study: its command, what it asks, its options, and about how long it takes, s, quick and in full.
+    """A study: its command, what it asks and does, its options with examples, and how long it takes, s, quick and full.
 
     The times were measured with one worker on a small machine; once it has run here, its own are known.
     """
@@ -106,7 +108,9 @@ class Kind:
     command: tuple[str, ...]
     title: str
     question: str
+    does: str
     options: type[Options]
+    examples: tuple[dict[str, Any], ...]
     seconds: tuple[float, float]
 
 
@@ -119,7 +123,9 @@ KINDS = {
             "Which ellipses can be believed?",
             "How often does each method's ellipse hold the true corner, with both covariances, in simulated rooms "
             "where the truth is known?",
+            "Which ellipses can be believed: corners simulated with known truth, by every method.",
             ConsistencyOptions,
+            ({"quick": True}, {"trials": 50000, "noise": "settings"}),
             (25, 240),
         ),
         Kind(
@@ -127,7 +133,9 @@ KINDS = {
             ("experiment", "cwlf"),
             "Conditional weighted linear fitting",
             "Is CWLF more certain of its corners than Arras and Siegwart's method, and faster, as its paper says?",
+            "The experiment of the paper on CWLF, in simulated rooms or from a recording.",
             CornerOptions,
+            ({"quick": True}, {"scans": 500, "noise": "settings"}),
             (8, 30),
         ),
         Kind(
@@ -135,7 +143,9 @@ KINDS = {
             ("experiment", "wctls"),
             "Weighted conformal total least squares",
             "Are the ellipses of WCTLS as small as its paper says, and do the corners keep to them?",
+            "The experiment of the paper on WCTLS, in simulated rooms or from a recording.",
             CornerOptions,
+            ({"quick": True}, {"quick": False, "seed": 7}),
             (6, 20),
         ),
         Kind(
@@ -144,7 +154,9 @@ KINDS = {
             "Clusters and the Kalman filter",
             "Which of four ways to cluster points makes the best landmarks, and what does the filter add, also when "
             "nothing is seen for a while?",
+            "The experiment of the paper on clusters and the Kalman filter, simulated.",
             DriveOptions,
+            ({"quick": True, "runs": 1},),
             (60, 1800),
         ),
     )

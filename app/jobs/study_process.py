@@ -1,6 +1,7 @@
 """A study as a process of its own: `lidarcore` at low priority, which ends with this process however that ends."""
 
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -75,8 +76,5 @@ class StudyProcess:
 
 def parts_done(line: str) -> tuple[int, int] | None:
     """How many parts are done, of how many, if the line says so."""
-    word, *numbers = line.split()[:3] or [""]
-    if word != PROGRESS or len(numbers) != 2 or not all(number.isdecimal() for number in numbers):
-        return None
-    done, total = map(int, numbers)
-    return done, total
+    found = re.match(rf"\s*{PROGRESS}\s+(\d+)\s+(\d+)(?!\S)", line)
+    return (int(found[1]), int(found[2])) if found else None

@@ -10,7 +10,7 @@ from typing import Any
 
 from lidarcore.files import partials, write
 
-from ..errors import ConflictError, NotFoundError, StorageError
+from ..errors import ConflictError, NotFoundError, storing
 from .study_kinds import KINDS
 
 MOST = 100  # reports kept; the user deletes what is not needed any more
@@ -53,10 +53,8 @@ class Reports:
         """Where a new report goes. Raises ConflictError if there are too many, StorageError."""
         if len(self.all()) >= MOST:
             raise ConflictError(f"There are {MOST} reports already: delete some of them first.")
-        try:
+        with storing(f"The folder {self.folder} cannot be created"):
             self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StorageError(f"The folder {self.folder} cannot be created: {error.strerror}.") from error
         stem = f"{kind}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
         names = [stem, *(f"{stem}_{n}" for n in range(2, MOST + 2))]
         return next(path for name in names if not (path := self.folder / f"{name}.html").exists())

@@ -1,54 +1,36 @@
-"""What of a running map of whole scans is on the disk: its grid, and the walls that were seen often enough."""
+"""Maps of whole scans into the file of maps and out of it: grids, and walls that were seen often enough."""
 
-import time
-from collections.abc import Mapping, Sequence
-from types import MappingProxyType
+import zlib
+from collections.abc import Sequence
 
 import numpy as np
 
-from lidarcore.errors import UnknownSessionError
-from lidarcore.landmarks import Atlas, LandmarkMap, StoredWall
+from lidarcore.errors import MapFileError, UnknownSessionError
+from lidarcore.landmarks import StoredGrid, StoredWall
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
-from .stored_grids import grid_to_stored
+from .session_writer import SessionWriter
 
 CONFIRMED = 3  # keyframes that saw a wall; what fewer saw may have been somebody who stood there
 
 
-class WallWriter:
-    """Writes the grid and the confirmed walls of one run into a session of their own, which begins with the first."""
+class WallWriter(SessionWriter):
+    """Writes the grid and the confirmed walls of a run."""
 
-    ids: Mapping[int, int] = MappingProxyType({})  # of landmarks: it has none
+    _written: WallTable | None = None
 
-    def __init__(self, atlas: Atlas, source: str, mode: str) -> None:
-        self._atlas, self._source, self._mode, self._started = atlas, source, mode, time.time()
-        self._map: LandmarkMap | None = None
-        self._written: WallTable | None = None
-
-    @property
-    def session(self) -> int | None:
-        """The id of the session; None before anything is on the disk."""
-        return None if self._map is None else self._map.session
-
-    def write(self, grid: OccupancyGrid, walls: WallTable, final: bool) -> None:
-        """Bring the disk up to date with the map, at the end of the run as before. Raises LandmarkMapError."""
+    def write(self, grid: OccupancyGrid, walls: WallTable, *, final: bool) -> None:
+        """Write all of them, unless they are those on the disk. Raises LandmarkMapError."""
         confirmed = to_stored(walls)
         if walls is self._written or (self._map is None and not confirmed):
             return
-        if self._map is None:
-            self._map = self._atlas.begin(self._source, self._started, self._mode)
         try:
-            self._map.put_walls(confirmed, grid_to_stored(grid))
+            self._begun().put_walls(confirmed, grid_to_stored(grid))
         except UnknownSessionError:
             self._map = self._written = None
             raise
         self._written = walls
-
-    def end(self) -> None:
-        """Note in the file that the run has ended. Raises LandmarkMapError."""
-        if self._map is not None:
-            self._atlas.end(self._map.session, time.time())
 
 
 def to_stored(walls: WallTable) -> list[StoredWall]:
@@ -83,3 +65,21 @@ def from_stored(walls: Sequence[StoredWall]) -> WallTable:
         column("last_seen")[:, 0],
         column("count")[:, 0].astype(np.int64),
     )
+
+
+def grid_to_stored(grid: OccupancyGrid) -> StoredGrid:
+    """A grid as the file of maps keeps it."""
+    (x, y, heading), (rows, columns) = grid.origin.tolist(), grid.cells.shape
+    cells = zlib.compress(grid.cells.tobytes())
+    return StoredGrid(grid.resolution, x, y, heading, rows, columns, cells)
+
+
+def grid_from_stored(stored: StoredGrid) -> OccupancyGrid:
+    """A grid that the file of maps keeps. Raises MapFileError if it is damaged."""
+    count = stored.rows * stored.columns
+    try:
+        cells = zlib.decompressobj().decompress(stored.cells, count + 1)
+        table = np.frombuffer(cells, np.int8).reshape(stored.rows, stored.columns)
+    except (zlib.error, ValueError) as error:
+        raise MapFileError(f"The grid of this map is damaged: {error}.") from error
+    return OccupancyGrid(table, stored.resolution, np.array([stored.x, stored.y, stored.heading]))

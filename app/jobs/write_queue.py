@@ -9,8 +9,7 @@ from dataclasses import replace
 from lidarcore.errors import LidarError, UnknownLandmarkError, UnknownSessionError
 from lidarcore.threads import join
 
-from .map_writer import MapChange
-from .stored_run import StoredRun, Waiting
+from .session_writer import MapChange, SessionWriter, Waiting
 
 PAUSE = 0.25  # s between two transactions: how far the disk may be behind
 RETRY = 1.0  # s after one that failed
@@ -26,11 +25,11 @@ class WriteQueue:
     error  why the newest map is not on the disk, in a sentence; None as long as it works
     """
 
-    def __init__(self, written: Callable[[MapChange], None], ended: Callable[[StoredRun], None]) -> None:
+    def __init__(self, written: Callable[[MapChange], None], ended: Callable[[SessionWriter], None]) -> None:
         """`written` is called in the thread with what was written, `ended` with a run of which all was."""
         self._written, self._ended = written, ended
         self.error: str | None = None
-        self._waiting: dict[StoredRun, Waiting] = {}
+        self._waiting: dict[SessionWriter, Waiting] = {}
         self._writing: Waiting | None = None
         self._news = threading.Condition()
         self._closing = threading.Event()
@@ -51,7 +50,7 @@ class WriteQueue:
             waiting = [*self._waiting.values(), *([self._writing] if self._writing else [])]
         return max((time.monotonic() - one.since for one in waiting), default=0.0)
 
-    def schedule(self, run: StoredRun, newest: Waiting) -> None:
+    def schedule(self, run: SessionWriter, newest: Waiting) -> None:
         """Have the newest map of a run written in its turn; that the run has ended is not forgotten."""
         with self._news:
             before = self._waiting.pop(run, newest)
@@ -77,12 +76,12 @@ class WriteQueue:
                 return
             self._closing.wait(pause)
 
-    def _attempt(self, run: StoredRun, waiting: Waiting) -> float:
+    def _attempt(self, run: SessionWriter, waiting: Waiting) -> float:
         """Write, and tell; how long to wait before the next time, s."""
         try:
-            change = waiting.write(waiting.ended)
+            change = waiting.write(final=waiting.ended)
             if waiting.ended:
-                run.writer.end()
+                run.finish()
                 self._ended(run)
             self.error = None
             if change:
@@ -91,7 +90,7 @@ class WriteQueue:
             return self._put_back(run, waiting, error)
         return PAUSE if change else 0.0
 
-    def _put_back(self, run: StoredRun, waiting: Waiting, error: Exception) -> float:
+    def _put_back(self, run: SessionWriter, waiting: Waiting, error: Exception) -> float:
         """A run waits on if nothing newer does; but a deleted map does not come back when its run has ended."""
         is_deleted = isinstance(error, UnknownLandmarkError | UnknownSessionError)
         if not (is_deleted and waiting.ended):

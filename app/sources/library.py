@@ -4,17 +4,17 @@ import re
 import shutil
 import tempfile
 import time
-from collections.abc import AsyncIterator, Callable, Collection, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Collection
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
 import anyio
 
-from ..errors import ConflictError, InvalidNameError, NotFoundError, StorageError, TooLargeError
+from ..errors import ConflictError, InvalidNameError, NotFoundError, TooLargeError, storing
 from .recorded import check_readable
-from .recording_facts import Facts, RecordingFacts
+from .recording_facts import RecordingFacts, facts
 from .trash import PREFIX as TRASHED
 from .trash import Trash
 
@@ -51,7 +51,6 @@ class Library:
     builtin: tuple[Path, ...] = BUILTIN
     in_use: Callable[[], Collection[Path]] = tuple
     trash: Trash = field(default_factory=Trash)
-    _facts: Facts = field(default_factory=Facts)
 
     def list(self) -> list[RecordingEntry]:
         """What could be played: files, and folders that are ROS 2 bags."""
@@ -78,14 +77,14 @@ class Library:
     def delete(self, name: str) -> None:
         """Put it into the trash. Raises what `path` raises, StorageError, and ConflictError if it is not in here."""
         path = self._own(name)
-        with _stored("The recording could not be deleted"):
+        with storing("The recording could not be deleted"):
             self.trash.put(path)
 
     def restore(self, name: str) -> RecordingEntry:
         """Take back what was deleted. Raises NotFoundError if it is too late, ConflictError if the name is taken."""
         path = self.folder / checked_name(name)
         self._check_free(path, overwrite=False)
-        with _stored("The recording could not be restored"):
+        with storing("The recording could not be restored"):
             self.trash.take_back(path)
         return self._entry(path)
 
@@ -93,13 +92,13 @@ class Library:
         """Give it another name. Raises what `delete` raises, and ConflictError if the new name is taken."""
         path, to = self._own(name), self.folder / checked_name(new)
         self._check_free(to, overwrite=False)
-        with _stored("The recording could not be renamed"):
+        with storing("The recording could not be renamed"):
             path.rename(to)
         return self._entry(to)
 
     def facts(self, name: str) -> RecordingFacts:
         """What it holds: all of it is read for that, once. Raises what `path` raises."""
-        return self._facts.of(self.path(name))
+        return facts(self.path(name))
 
     def file(self, name: str) -> Path:
         """The recording as one file. Raises what `path` raises, and ConflictError for a folder."""
@@ -125,7 +124,7 @@ class Library:
         """
         path = self.folder / checked_name(name)
         self._check_free(path, overwrite)
-        try:
+        with storing("The recording could not be stored"):
             self.folder.mkdir(parents=True, exist_ok=True)
             with tempfile.TemporaryDirectory(dir=self.folder, prefix=UPLOADING) as workplace:
                 partial = Path(workplace) / path.name
@@ -133,20 +132,14 @@ class Library:
                 await anyio.to_thread.run_sync(check_readable, partial)
                 self._check_free(path, overwrite)
                 partial.replace(path)
-        except OSError as error:
-            raise StorageError(f"The recording could not be stored: {error.strerror}.") from error
         return self._entry(path)
 
     def new(self, name: str) -> Path:
         """Where a new recording goes. Raises ConflictError, InvalidNameError, StorageError."""
         path = self.folder / checked_name(name)
         self._check_free(path, overwrite=False)
-        try:
+        with storing(f"The recordings folder {self.folder} cannot be created"):
             self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise StorageError(
-                f"The recordings folder {self.folder} cannot be created: {error.strerror}."
-            ) from error
         return path
 
     def remove_abandoned(self) -> None:
@@ -204,15 +197,6 @@ def checked_name(name: str) -> str:
             f"{name!r} is not a plain file name: use no slashes, no leading dot and at most 200 bytes."
         )
     return name
-
-
-@contextmanager
-def _stored(trouble: str) -> Iterator[None]:
-    """Turn what the disk refuses into a StorageError."""
-    try:
-        yield
-    except OSError as error:
-        raise StorageError(f"{trouble}: {error.strerror}.") from error
 
 
 def _is_candidate(path: Path) -> bool:

@@ -19,6 +19,7 @@ from lidarcore.rplidar import (
     path_of,
 )
 
+from ..records import record
 from .history import HistorySource
 from .source import DeviceStatus
 
@@ -106,8 +107,10 @@ class LiveSource(HistorySource):
         )
 
     def device(self) -> DeviceStatus:
-        driver, statistics = self._driver, self._driver.statistics
-        return DeviceStatus(
+        driver = self._driver
+        return record(
+            DeviceStatus,
+            driver.statistics,
             port=driver.port,
             name=driver.info.name,
             serial=driver.info.serial,
@@ -121,14 +124,6 @@ class LiveSource(HistorySource):
             baud=driver.baud,
             state=driver.state,
             error=driver.error,
-            rate_hz=statistics.rate_hz,
-            samples_per_s=statistics.samples_per_s,
-            completeness=statistics.completeness,
-            bytes=statistics.bytes,
-            revolutions=statistics.revolutions,
-            reconnects=statistics.reconnects,
-            overruns=statistics.overruns,
-            dropped=dict(statistics.dropped),
         )
 
     def _follow(self) -> None:

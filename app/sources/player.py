@@ -8,6 +8,7 @@ from typing import Literal
 
 from lidarcore.threads import join
 
+from ..records import record
 from .source import END_WITHIN, DeviceStatus, Source
 from .timed_scan import Position, SourceKind, TimedScan
 
@@ -139,22 +140,15 @@ class Player:
         """What plays, where it is, and how."""
         with self._condition:
             source, index = self._source, self._index
-            return SourceStatus(
-                kind=source.kind,
-                live=source.live,
+            return record(
+                SourceStatus,
+                source,
                 device=source.device(),
                 recording=source.name,
-                topic=source.topic,
-                topics=source.topics,
-                format=source.format,
-                notes=source.notes,
                 state=self._state(),
-                error=source.error,
                 index=index,
                 count=self._count(),
-                complete=source.complete,
                 time=source.time(index) if self._there(index) else 0.0,
-                duration=source.duration,
                 speed=self._speed,
                 loop=self._loop,
             )

@@ -1,7 +1,8 @@
 """What a recording holds, found by reading all of it once."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 
@@ -11,6 +12,7 @@ from ..isolation import Isolated
 from .recorded import PERIOD
 
 MOST = 500  # recordings of which the facts are kept
+_READING = Lock()  # one at a time: reading takes a core
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,24 +29,15 @@ class RecordingFacts:
     problem: str | None = None
 
 
-@dataclass
-class Facts:
-    """Facts of recordings, each read once while it does not change. For any thread."""
-
-    _known: dict[tuple[Path, int, int], RecordingFacts] = field(default_factory=dict)
-    _lock: Lock = field(default_factory=Lock)
-
-    def of(self, path: Path) -> RecordingFacts:
-        """Read the recording, in a process of its own, unless it is known. One at a time: reading takes a core."""
-        status = path.stat()
-        key = (path, status.st_size, status.st_mtime_ns)
-        with self._lock:
-            if key not in self._known:
-                self._known = dict([*self._known.items(), (key, _read(path))][-MOST:])
-            return self._known[key]
+def facts(path: Path) -> RecordingFacts:
+    """Read the recording, in a process of its own, unless it is known and has not changed. For any thread."""
+    status = path.stat()
+    with _READING:
+        return _read(path, status.st_size, status.st_mtime_ns)
 
 
-def _read(path: Path) -> RecordingFacts:
+@lru_cache(MOST)
+def _read(path: Path, size: int, modified: int) -> RecordingFacts:
     found: list[RecordingFacts] = []
     try:
         found.extend(Isolated(path.name, RecordingError, _facts, path))

@@ -19,8 +19,7 @@ class Trash:
     """Files and folders, each in a folder of its own until `undo_within` seconds have passed. For any thread."""
 
     undo_within: float = UNDO_WITHIN
-    _kept: dict[str, Path] = field(default_factory=dict)
-    _timers: dict[Path, threading.Timer] = field(default_factory=dict)
+    _timers: dict[Path, threading.Timer] = field(default_factory=dict)  # of what waits, the last deleted last
     _lock: threading.Lock = field(default_factory=threading.Lock)
 
     def put(self, path: Path) -> None:
@@ -28,7 +27,6 @@ class Trash:
         with self._lock:
             bin_ = Path(tempfile.mkdtemp(dir=path.parent, prefix=PREFIX))
             path.rename(bin_ / path.name)
-            self._kept[path.name] = bin_ / path.name
             timer = threading.Timer(self.undo_within, self._remove, [bin_ / path.name])
             timer.daemon = True
             self._timers[bin_ / path.name] = timer
@@ -37,11 +35,11 @@ class Trash:
     def take_back(self, path: Path) -> None:
         """Put back what was taken away from there last. Raises NotFoundError if that is gone, and OSError."""
         with self._lock:
-            if path.name not in self._kept:
+            kept = next((one for one in reversed(self._timers) if one.name == path.name), None)
+            if kept is None:
                 raise NotFoundError(
                     f"{path.name!r} cannot be restored: deleted files are kept for only {self.undo_within:g} s."
                 )
-            kept = self._kept.pop(path.name)
             self._timers.pop(kept).cancel()
             kept.rename(path)
             kept.parent.rmdir()
@@ -53,9 +51,6 @@ class Trash:
 
     def _remove(self, kept: Path) -> None:
         with self._lock:
-            if (timer := self._timers.pop(kept, None)) is None:
-                return
-            timer.cancel()
-            if self._kept.get(kept.name) == kept:
-                del self._kept[kept.name]
-            shutil.rmtree(kept.parent, ignore_errors=True)
+            if timer := self._timers.pop(kept, None):
+                timer.cancel()
+                shutil.rmtree(kept.parent, ignore_errors=True)

@@ -4,7 +4,7 @@ from pydantic_core import to_json
 
 from lidarcore.landmarks import Landmark
 
-from ..jobs.map_writer import MapChange
+from ..jobs.session_writer import MapChange
 
 
 class MapChanges:

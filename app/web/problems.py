@@ -86,22 +86,6 @@ def documented(*statuses: int) -> dict[int | str, dict[str, Any]]:
     }
 
 
-def document(app: FastAPI) -> None:
-    """Describe problem details in the app's OpenAPI document, and that a body may be no JSON at all."""
-    describe = app.openapi
-
-    def openapi() -> dict[str, Any]:
-        description = describe()
-        description["components"]["schemas"]["ProblemJson"] = ProblemJson.model_json_schema()
-        operations = (operation for path in description["paths"].values() for operation in path.values())
-        for operation in operations:
-            if "requestBody" in operation:
-                operation["responses"].setdefault("400", documented(400)[400])
-        return description
-
-    app.openapi = openapi  # type: ignore[method-assign]
-
-
 def install(app: FastAPI) -> None:
     """Answer every error of the app with problem details."""
 

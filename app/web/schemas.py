@@ -8,6 +8,7 @@ from typing import Annotated, Literal, NotRequired
 from pydantic import BaseModel, ConfigDict, Field, WithJsonSchema
 from typing_extensions import TypedDict
 
+from ..scene.point_colours import ColourScale
 from ..sources.timed_scan import Position
 
 Pair = tuple[float, float]
@@ -46,14 +47,6 @@ class OdometryPose(Body):
     x: Coordinate
     y: Coordinate
     heading: Annotated[Number, Field(description="rad")]
-
-
-class IntervalJson(TypedDict):
-    """A figure and the ends of its 95 % confidence interval; null where it cannot be told yet."""
-
-    value: float | None
-    low: float | None
-    high: float | None
 
 
 class SegmentJson(TypedDict):
@@ -171,14 +164,6 @@ class TimingsJson(TypedDict):
     age_ms: float
 
 
-class ColourScaleJson(TypedDict):
-    """Colours of the points from zero to `high`, at equal distances."""
-
-    high: float
-    unit: str
-    stops: tuple[str, ...]
-
-
 class FrameJson(TypedDict):
     """`extent` of what is seen and of the sensor: from and to along x, then along y, m in the world frame.
 
@@ -200,7 +185,7 @@ class FrameJson(TypedDict):
     methods: list[str]
     timings: TimingsJson
     extent: Matrix
-    colour_scale: ColourScaleJson | None
+    colour_scale: ColourScale | None
     rate_hz: float
     dropped: int
     segments: dict[str, list[SegmentJson]]

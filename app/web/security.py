@@ -9,6 +9,7 @@ like one of ours by rebinding its own name to our address.
 import ipaddress
 import secrets
 from collections.abc import Collection
+from contextlib import suppress
 from urllib.parse import urlsplit
 
 from starlette.datastructures import URL, MutableHeaders
@@ -109,17 +110,15 @@ class Guard:
 
 
 def _hostname(host: str) -> str:
-    try:
+    with suppress(ValueError):
         return urlsplit(f"//{host}").hostname or ""
-    except ValueError:
-        return ""
+    return ""
 
 
 def _netloc(origin: str) -> str:
-    try:
+    with suppress(ValueError):
         return urlsplit(origin).netloc
-    except ValueError:
-        return ""
+    return ""
 
 
 def _is_address(name: str) -> bool:

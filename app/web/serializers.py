@@ -15,20 +15,20 @@ from lidarcore.geometry import squared_mahalanobis
 from ..pipeline.frame import Frame
 from ..pipeline.slam_run import Localization
 from ..pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns
+from ..records import record
 from ..scene.point_colours import colour_scale
 from .schemas import (
     ClusterJson,
-    ColourScaleJson,
     CornerJson,
     FrameJson,
     InnovationJson,
     LocalizationJson,
-    Matrix3,
     MeasuredCornerJson,
     PoseJson,
     RejectionJson,
     SegmentJson,
     SummaryJson,
+    TimingsJson,
 )
 
 BAND = 0.95  # of the normalised innovation squared
@@ -39,42 +39,29 @@ KEPT = 2  # frames whose JSON is kept: the newest, and the one before it that is
 def _frame_json(frame: Frame) -> FrameJson:
     """The frame; its age is taken when it is first asked for, that is when it is sent."""
     scan, chosen = frame.scan, frame.settings.extraction
-    return {
-        "sequence": frame.sequence,
-        "stamp": scan.stamp,
-        "source": frame.timed.position,
-        "n_beams": len(scan),
-        "n_valid": int(scan.valid.sum()),
-        "completeness": scan.completeness,
-        "gaps": scan.gaps.tolist(),
-        "noise_seen": frame.main.noise_seen,
-        "noise_remark": frame.noise_remark,
-        "fitter": chosen.fitter,
-        "covariance": chosen.covariance,
-        "methods": list(frame.features),
-        "timings": {
-            "extract_us": frame.extract_us,
-            "cluster_us": frame.cluster_us,
-            "locate_us": frame.locate_us,
-            "draw_us": frame.draw_us,
-            "age_ms": 1e3 * frame.age(),
-        },
-        "extent": frame.extent().round(4).tolist(),
-        "colour_scale": _colour_scale_json(frame),
-        "rate_hz": frame.rate_hz,
-        "dropped": frame.dropped,
-        "segments": {name: segments_json(found) for name, found in frame.features.items()},
-        "corners": corners_json(frame),
-        "rejections": rejections_json(frame.main),
-        "summary": {name: summary_json(found) for name, found in frame.features.items()},
-        "clusters": None if frame.clusters is None else clusters_json(frame.clusters),
-        "localization": None if frame.localization is None else localization_json(frame.localization),
-    }
-
-
-def _colour_scale_json(frame: Frame) -> ColourScaleJson | None:
-    scale = colour_scale(frame)
-    return None if scale is None else {"high": scale.high, "unit": scale.unit, "stops": scale.stops}
+    return record(
+        FrameJson,
+        frame,
+        stamp=scan.stamp,
+        source=frame.timed.position,
+        n_beams=len(scan),
+        n_valid=int(scan.valid.sum()),
+        completeness=scan.completeness,
+        gaps=scan.gaps.tolist(),
+        noise_seen=frame.main.noise_seen,
+        fitter=chosen.fitter,
+        covariance=chosen.covariance,
+        methods=list(frame.features),
+        timings=record(TimingsJson, frame, age_ms=1e3 * frame.age()),
+        extent=frame.extent().round(4).tolist(),
+        colour_scale=colour_scale(frame),
+        segments={name: segments_json(found) for name, found in frame.features.items()},
+        corners=corners_json(frame),
+        rejections=[record(RejectionJson, one, xy=one.xy.tolist()) for one in frame.main.rejections],
+        summary={name: summary_json(found) for name, found in frame.features.items()},
+        clusters=None if frame.clusters is None else clusters_json(frame.clusters),
+        localization=None if frame.localization is None else localization_json(frame.localization),
+    )
 
 
 @lru_cache(2 * KEPT)
@@ -135,21 +122,6 @@ def _rows(
     return [dict(zip(names, row, strict=True)) for row in zip(*map(found.__getitem__, names), strict=True)]
 
 
-def rejections_json(features: Features) -> list[RejectionJson]:
-    """What was rejected and why."""
-    return [
-        {
-            "kind": r.kind,
-            "reason": r.reason,
-            "message": r.message,
-            "xy": (float(r.xy[0]), float(r.xy[1])),
-            "first_beam": int(r.first_beam),
-            "last_beam": int(r.last_beam),
-        }
-        for r in features.rejections
-    ]
-
-
 def summary_json(features: Features) -> SummaryJson:
     """How many corners, and how large their ellipses are."""
     area = features.corners.area
@@ -177,29 +149,24 @@ def localization_json(localization: Localization) -> LocalizationJson:
     """The localization of one scan as JSON."""
     found = localization.tracking
     estimate, confirmed = found.estimate, found.landmarks.confirmed
-    return {
-        "mode": found.mode,
-        "state": found.state,
-        "message": found.message,
-        "session": localization.session,
-        "pose": pose_json(estimate.pose),
-        "covariance": cast(Matrix3, estimate.covariance.tolist()),
-        "velocity": None
-        if estimate.velocity is None
-        else cast("tuple[float, float]", tuple(estimate.velocity.tolist())),
-        "dead_reckoned": None if found.dead_reckoned is None else pose_json(found.dead_reckoned),
-        "truth": _truth_json(localization.truth),
-        "landmarks": len(confirmed),
-        "confirmed": int(confirmed.sum()),
-        "tentative": found.landmarks.points.xy[~confirmed].round(4).tolist(),
-        "observed": len(found.observed),
-        "ambiguous": len(found.ambiguous),
-        "unmatched": len(found.unmatched),
-        "innovations": _innovations_json(localization),
-        "nis": found.nis,
-        "dof": found.dof,
-        "nis_band": nis_band(found.dof),
-    }
+    return record(
+        LocalizationJson,
+        found,
+        session=localization.session,
+        pose=pose_json(estimate.pose),
+        covariance=estimate.covariance.tolist(),
+        velocity=None if estimate.velocity is None else tuple(estimate.velocity.tolist()),
+        dead_reckoned=None if found.dead_reckoned is None else pose_json(found.dead_reckoned),
+        truth=_truth_json(localization.truth),
+        landmarks=len(confirmed),
+        confirmed=int(confirmed.sum()),
+        tentative=found.landmarks.points.xy[~confirmed].round(4).tolist(),
+        observed=len(found.observed),
+        ambiguous=len(found.ambiguous),
+        unmatched=len(found.unmatched),
+        innovations=_innovations_json(localization),
+        nis_band=nis_band(found.dof),
+    )
 
 
 def nis_band(dof: int) -> tuple[float, float]:

@@ -4,18 +4,16 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from anyio import CapacityLimiter
 from fastapi import APIRouter, FastAPI
 from fastapi.staticfiles import StaticFiles
-from starlette.responses import FileResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, Response
+from starlette.types import Receive, Scope, Send
 
 from ..scene.palette import stylesheet
-from . import problems
-from .documentation import Documentation
+from . import openapi, problems
 from .metrics import metrics_router
 from .routes import (
     calibration,
-    clusters,
     frame,
     grid,
     landmarks,
@@ -39,7 +37,7 @@ from .state import ServerOptions, State
 
 API = "/api/v1"
 ROUTES = (
-    frame, clusters, measure, localization, walls, grid, landmarks, map, sessions, repeatability, calibration, studies,
+    frame, measure, localization, walls, grid, landmarks, map, sessions, repeatability, calibration, studies,
     settings, source, sensor, recordings, recorder, selection, meta,
 )  # fmt: skip
 PAGES = {"/": "index.html", "/studies": "studies.html", "/guide": "guide.html", "/docs": "docs.html"}
@@ -47,6 +45,16 @@ _APP = Path(__file__).parents[1]
 STATIC = next(
     folder for folder in (_APP / "static", _APP.parent / "static") if folder.is_dir()
 )  # wheel, source tree
+# In the wheel, in the source tree.
+DOCUMENTATION = (_APP / "documentation", _APP.parent / "docs" / "_build" / "html")
+MISSING = """<!doctype html><html lang="en"><meta charset="utf-8"><title>lidarcore: documentation</title>
+<meta name="viewport" content="width=device-width"><meta name="color-scheme" content="light dark">
+<style>body { max-width: 38rem; margin: 3rem auto; padding: 0 1rem; font: 16px/1.5 system-ui, sans-serif; }</style>
+<h1>The documentation has not been built</h1>
+<p>In the source tree, run <code>make docs</code> and reload this page. It needs no restart.</p>
+<p>The same pages can be read as text in the folder <code>docs</code>. The <a href="../guide">guide</a> to the ellipses
+and the <a href="../docs">reference of the REST API</a> are always there. <a href="../">Back to the dashboard</a></p>
+"""
 # What the OpenAPI document says of the whole; /docs shows it, and tries it out, by Swagger UI without a network.
 DESCRIPTION = """2D lidar scans to walls, corners and their covariances. Metres, radians, seconds.
 Errors are problem details (RFC 9457).
@@ -66,7 +74,6 @@ def create_app(options: ServerOptions) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        app.state.heavy = CapacityLimiter(1)
         state.open()
         yield
         state.close()
@@ -82,7 +89,7 @@ def create_app(options: ServerOptions) -> FastAPI:
     )
     app.state.server = state
     problems.install(app)
-    problems.document(app)
+    openapi.document(app)
     api = APIRouter(prefix=API)
     for module in ROUTES:
         api.include_router(module.router)
@@ -109,3 +116,16 @@ def _add_palette(app: FastAPI) -> None:
     @app.get("/palette.css", include_in_schema=False)
     def palette() -> Response:
         return Response(stylesheet(), media_type="text/css")
+
+
+class Documentation:
+    """An ASGI app: the built documentation, or a page that says how to build it, which needs no restart then."""
+
+    def __init__(self, folders: tuple[Path, ...] = DOCUMENTATION) -> None:
+        """The first folder that holds an index.html is served."""
+        self._folders = folders
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        folder = next((folder for folder in self._folders if (folder / "index.html").is_file()), None)
+        app = HTMLResponse(MISSING, 404) if folder is None else StaticFiles(directory=folder, html=True)
+        await app(scope, receive, send)

@@ -1,12 +1,16 @@
 """The server process: one socket, its address printed, a clean end."""
 
+import ctypes
 import errno
 import ipaddress
 import secrets
 import signal
 import socket
+import subprocess
+import sys
 import webbrowser
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -18,6 +22,8 @@ if TYPE_CHECKING:
 
 WS_MESSAGE = 1 << 20  # bytes of one message from a browser
 GRACE = 2  # s that connections get to end
+_M_ARENA_MAX = -8  # malloc.h of glibc
+_MOST_ARENAS = 2
 
 
 class AddressError(OSError):
@@ -53,8 +59,6 @@ def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_b
     """Serve until interrupted. Raises RecordingError or TopicError if the recording cannot be played."""
     from threadpoolctl import threadpool_limits
 
-    from ..jobs.compiling import compiled_ahead
-    from ..memory import share_arenas
     from .log import throttle_servers
     from .server import create_app
     from .transport import allow_many_files
@@ -73,6 +77,37 @@ def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_b
         webbrowser.open(url)
     with compiled_ahead(), suppress(KeyboardInterrupt):
         server.run(sockets=[listening])
+
+
+def share_arenas() -> None:
+    """Have all threads share few of glibc's heaps: each keeps what its threads freed, and requests come in many."""
+    with suppress(AttributeError, OSError, TypeError):  # another C library, which has none
+        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, _MOST_ARENAS)
+
+
+@contextmanager
+def compiled_ahead() -> Iterator[None]:
+    """Compile the kernels of maps that the cache lacks in a process of its own: the first map would wait a minute.
+
+    What is not finished in the end is left for next time. It says nothing: without it everything works, later.
+    """
+    from lidarcore.mapping import precompile
+
+    if not precompile.is_missing():
+        yield
+        return
+    # A session of its own: Ctrl-C ends the server, which then ends this process without a traceback in between.
+    process = subprocess.Popen(
+        [sys.executable, "-m", precompile.__name__],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        yield
+    finally:
+        process.kill()  # a kernel that is half written is written to a name of its own first
+        process.wait()
 
 
 def uvicorn_server(app: "FastAPI") -> "Server":

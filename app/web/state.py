@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from anyio import CapacityLimiter
+
 from lidarcore import Scan, extract
 from lidarcore.body_mask import masked
 from lidarcore.errors import LandmarkMapError
@@ -53,7 +55,12 @@ class ServerOptions:
 
 
 class State:
-    """The parts of one server, wired together; routes ask it for what they need."""
+    """The parts of one server, wired together; routes ask it for what they need.
+
+    heavy  what takes much memory or time is made for one request at a time; the others wait without a thread
+    """
+
+    heavy: CapacityLimiter
 
     def __init__(self, options: ServerOptions) -> None:
         """Raises RecordingError, TopicError or DeviceError if there is nothing to play."""
@@ -83,13 +90,14 @@ class State:
 
     def open(self) -> None:
         """Begin to play, and to deliver on the running event loop."""
+        self.heavy = CapacityLimiter(1)
         self.hub.open()
         self.runtime.start()
 
     def close(self) -> None:
         """End everything, what produces before what is told of it."""
         self.hub.close()
-        for part in (self.runtime, self.studies, self.repeatability, self.calibration):
+        for part in (self.runtime, self.studies, self.calibration):
             part.close()
         self.recorder.stop()
         self.library.trash.empty()

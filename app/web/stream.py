@@ -14,8 +14,8 @@ from lidarcore.mapping.walls import Walls
 
 from ..errors import explained
 from ..jobs.landmark_store import LandmarkStore
-from ..jobs.map_writer import MapChange
 from ..jobs.recorder import AsyncRecorder
+from ..jobs.session_writer import MapChange
 from ..pipeline.frame import Frame
 from ..pipeline.runtime import Runtime
 from .map_changes import MapChanges

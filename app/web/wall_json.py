@@ -1,7 +1,9 @@
 """Walls of a map as JSON: for answers, and all of them for the stream."""
 
 from collections.abc import Iterable
+from typing import cast
 
+import numpy as np
 from pydantic_core import to_json
 from typing_extensions import TypedDict
 
@@ -44,20 +46,12 @@ def walls_text(walls: Walls | None) -> str:
 
 def wall_rows(walls: WallTable, chosen: Iterable[int]) -> list[WallJson]:
     """An object for each of the walls chosen by their places in the table."""
-    columns = {
-        "id": walls.ids.tolist(),
-        "alpha": walls.alpha.tolist(),
-        "r": walls.r.tolist(),
-        "covariance": walls.line_covariance.tolist(),
-        "start": walls.ends[:, 0].tolist(),
-        "end": walls.ends[:, 1].tolist(),
-        "length": walls.length.tolist(),
-        "length_variance": walls.length_variance.tolist(),
-        "ended": walls.ended.tolist(),
-        "in_corner": walls.in_corner.tolist(),
-        "first_seen": walls.first_seen.tolist(),
-        "last_seen": walls.last_seen.tolist(),
-        "count": walls.count.tolist(),
+    given = {
+        "id": walls.ids,
+        "covariance": walls.line_covariance,
+        "start": walls.ends[:, 0],
+        "end": walls.ends[:, 1],
     }
-    rows = list(zip(*columns.values(), strict=True))
-    return [WallJson(**dict(zip(columns, rows[i], strict=True))) for i in chosen]  # type: ignore[typeddict-item]
+    names, rows = WallJson.__annotations__, np.fromiter(chosen, int)
+    columns = [(given[name] if name in given else getattr(walls, name))[rows].tolist() for name in names]
+    return cast(list[WallJson], [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)])

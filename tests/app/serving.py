@@ -22,8 +22,6 @@ from waiting import PATIENCE
 from waiting import wait_until as wait_until
 from websockets.sync.client import ClientConnection, connect
 
-from lidarcore import open_recording
-
 ROOT = Path(__file__).parents[2]
 CORNERS = np.array([[3.5, 2.2], [-2.5, 2.2], [-2.5, -1.8], [3.5, -1.8]])  # m, in the sensor frame
 SINCE = 1e9  # s: stamp of the first scan of what a server plays until it is told what to play
@@ -77,16 +75,12 @@ class Server:
             return stream.frame(lambda frame: frame["sequence"] > newest["sequence"])
 
     def play(self, path: Path, **options: Any) -> Json:
-        """Play that file of the folder, and return a frame of it: of a recording that begins when it does."""
-        begins = next(iter(open_recording(path, options.get("topic")))).stamp
-
-        def is_of_it(frame: Json) -> bool:
-            source = frame["source"]
-            return source["kind"] == "recording" and abs(frame["stamp"] - source["time"] - begins) < 1e-3
-
+        """Play that file of the folder, and return a frame of it: never one of the same file played before."""
+        self.change("PUT", "/source", {"kind": "recording", "name": path.name, **options})
+        opened = self.runtime.player._opened
+        wait_until(lambda: self.runtime.frame and self.runtime.frame.timed.source == opened, f"{path} plays")
         with self.stream() as stream:
-            self.change("PUT", "/source", {"kind": "recording", "name": path.name, **options})
-            return stream.frame(is_of_it)
+            return stream.frame()
 
     def recordings(self) -> list[Json]:
         """The entries of what is in the folder: without what comes along, or was given at the start."""

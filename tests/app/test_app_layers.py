@@ -7,16 +7,16 @@ from pathlib import Path
 import pytest
 
 APP = Path(__file__).parents[2] / "app"
-BASE = {"errors", "isolation"}
+BASE = {"errors", "isolation", "records"}
 MAY_IMPORT = {
     "errors": set(),
     "isolation": set(),
-    "memory": set(),
+    "records": set(),
     "sources": BASE,
     "pipeline": BASE | {"sources"},
     "scene": BASE | {"sources", "pipeline"},
     "jobs": BASE | {"sources", "pipeline"},
-    "web": BASE | {"memory", "sources", "pipeline", "scene", "jobs"},
+    "web": BASE | {"sources", "pipeline", "scene", "jobs"},
     "cli": BASE | {"sources", "pipeline", "jobs", "benchmarks"},
     "benchmarks": BASE | {"sources", "pipeline", "scene", "jobs", "web", "cli"},
 }

@@ -119,7 +119,7 @@ def test_heavy_answers_are_made_one_at_a_time_and_light_ones_go_on(
         making -= 1
 
     monkeypatch.setattr(map_routes, "export_picture", slow)
-    heavy, asked = shared_server.app.state.heavy, {"format": "png", "session": loaded["id"]}
+    heavy, asked = shared_server.app.state.server.heavy, {"format": "png", "session": loaded["id"]}
     with ThreadPoolExecutor(5) as pool:
         answers = [pool.submit(shared_server.http.get, "/map", params=asked) for _ in range(5)]
         try:

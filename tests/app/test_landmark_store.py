@@ -13,7 +13,7 @@ import httpx
 import numpy as np
 import pytest
 from lidarcore_app.jobs.landmark_store import LandmarkStore
-from lidarcore_app.jobs.map_writer import MapChange
+from lidarcore_app.jobs.session_writer import MapChange
 from processes import Serving
 from serving import ROOT, wait_until, write_room
 from waiting import PATIENCE

@@ -8,7 +8,7 @@ import pytest
 
 PROGRAM = """
 import ctypes, sys, threading
-from lidarcore_app.memory import share_arenas
+from lidarcore_app.web.serving import share_arenas
 if sys.argv[1:]:
     share_arenas()
 libc = ctypes.CDLL(None)

@@ -15,8 +15,8 @@ from urllib.parse import unquote, urlsplit
 
 import httpx
 import pytest
-from lidarcore_app.web.documentation import Documentation
 from lidarcore_app.web.security import Guard
+from lidarcore_app.web.server import Documentation
 from lidarcore_app.web.serving import listen, uvicorn_server
 from playwright.sync_api import sync_playwright
 

@@ -165,8 +165,8 @@ def test_a_plain_corridor_tells_its_heading_by_walls_far_ahead(seed):
     mapper, odometry = Mapper(), np.zeros(3)
     for k, pose in enumerate(poses):
         if k:
-            turned = [0, 0, 0.01] + rng.normal(0, [0.02, 0.01, 0.01])
-            odometry = compose(odometry, relative(poses[k - 1], pose) + turned)
+            noise = rng.normal(0, [0.02, 0.01, 0.01])
+            odometry = compose(odometry, relative(poses[k - 1], pose) + noise + [0, 0, 0.01])
         scan = sick_scan(corridor, pose, SensorNoise(0.015, 0.001), rng)
         mapper.step(replace(scan, stamp=float(k), odometry=odometry))
     last = len(mapper.keyframes.poses) - 1

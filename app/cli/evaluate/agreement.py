@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Set, SettingsFile, check_output, counting, settings_from
+from ..options import Given, Set, SettingsFile, TopicOfAll, check_output, settings_from, to_file
+from ..progress import counting
 from .stations import named_stations
 
 if TYPE_CHECKING:
@@ -16,16 +17,12 @@ def agreement(
     recordings: Annotated[
         list[Path], typer.Argument(help="recordings of a sensor that stood still at several places")
     ],
-    given: Annotated[
-        bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
-    ] = False,
+    given: Given = False,
     by_pair: Annotated[
         bool, typer.Option("--by-pair", help="also print a line for each pair of stations")
     ] = False,
-    topic: Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="FILE.json with the figures of every pair")
-    ] = None,
+    topic: TopicOfAll = None,
+    output: Annotated[Path | None, to_file("FILE.json with the figures of every pair")] = None,
     settings: SettingsFile = None,
     set_: Set = None,
 ) -> None:
@@ -53,22 +50,16 @@ def agreement(
 def _print(found: "AgreementStudy", by_pair: bool) -> None:
     """A row for each kind of claim, and with `by_pair` a line for each pair of stations."""
     from rich.console import Console
-    from rich.table import Table
 
-    table = Table(title="Differences between neighbouring stations", title_justify="left")
-    for heading in (
-        "claims",
-        "systematic part, mm",
-        "walls in 95 %",
-        "lowest, highest pair",
-        "corners in 95 %",
-    ):
-        table.add_column(heading)
-    table.add_row("consistent", *_cells(found.consistent))
-    table.add_row("map", *_cells(found.map))
-    table.add_row("map, with a systematic part", *_cells(found.systematic))
+    from ..tables import table
+
+    columns = ("claims", "systematic part, mm", "walls in 95 %", "lowest, highest pair", "corners in 95 %")
+    shown = table("Differences between neighbouring stations", columns, ())
+    shown.add_row("consistent", *_cells(found.consistent))
+    shown.add_row("map", *_cells(found.map))
+    shown.add_row("map, with a systematic part", *_cells(found.systematic))
     console = Console()
-    console.print(table)
+    console.print(shown)
     console.print(
         f"{found.map.differences:,} differences of walls between {len(found.map.pairs)} pairs of stations."
     )

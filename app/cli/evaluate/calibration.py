@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, Seed, Workers, check_output, console, numbers
+from ..options import MOST, Seed, Workers, check_output, numbers, to_file
 from ..progress import ForPrograms, counted
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def calibration(
     ] = 40,
     seed: Seed = 0,
     workers: Workers = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="FILE.json with every figure")] = None,
+    output: Annotated[Path | None, to_file("FILE.json with every figure")] = None,
     for_programs: ForPrograms = False,
 ) -> None:
     """Calibrate in simulated rooms with uneven walls: do intervals hold the truth, and ellipses afterwards?
@@ -51,6 +51,7 @@ def calibration(
     from lidarcore.evaluation.calibration.design import Design
     from lidarcore.evaluation.calibration.study import study
 
+    from ..tables import console
     from .calibration_table import cells_table, parts_table, remarks
 
     check_output(output, ".json")

@@ -10,46 +10,38 @@ from lidarcore.evaluation.calibration.study import CalibrationStudy, Cell, Part
 from lidarcore.evaluation.consistency.figures import HONEST
 from lidarcore.evaluation.intervals import Interval
 
+from ..tables import table
+
 
 def parts_table(study: CalibrationStudy) -> Table:
     """Every part of the noise over all rooms, and the unevenness by its size and length."""
     low, high = HONEST
     design = study.design
-    table = Table(
-        title=f"{design.rooms} simulated rooms: 95 % intervals from {design.scans} scans "
+    result = table(
+        f"{design.rooms} simulated rooms: 95 % intervals from {design.scans} scans "
         f"(asked: {low:g} to {high:g} of them hold the truth), errors from {design.fewer}",
-        title_justify="left",
+        ("part",),
+        ("rooms", "hold the truth", "mean error", f"from {design.fewer}: median", "90 % within"),
     )
-    table.add_column("part")
-    for heading in ("rooms", "hold the truth", "mean error", f"from {design.fewer}: median", "90 % within"):
-        table.add_column(heading, justify="right")
     for part in study.parts():
-        table.add_row(part.name, *_cells(part))
+        result.add_row(part.name, *_cells(part))
     for cell in study.cells:
-        table.add_section()
+        result.add_section()
         for part in study.parts(cell):
             if part.name.startswith("unevenness"):
-                table.add_row(f"{part.name}: {_named(cell)}", *_cells(part))
-    return table
+                result.add_row(f"{part.name}: {_named(cell)}", *_cells(part))
+    return result
 
 
 def cells_table(study: CalibrationStudy) -> Table:
     """The ellipses after the calibration, by unevenness."""
     low, high = HONEST
-    table = Table(
-        title=f"95 % ellipses after the calibration (asked: {low:g} to {high:g})", title_justify="left"
+    scatter_of = ("walls: scatter, standing", "claimed / scatter", "corners", "claimed / scatter")
+    result = table(
+        f"95 % ellipses after the calibration (asked: {low:g} to {high:g})",
+        ("walls uneven by",),
+        ("walls: truth, other places", "corners", *scatter_of),
     )
-    table.add_column("walls uneven by")
-    headings = (
-        "walls: truth, other places",
-        "corners",
-        "walls: scatter, standing",
-        "claimed / scatter",
-        "corners",
-        "claimed / scatter",
-    )
-    for heading in headings:
-        table.add_column(heading, justify="right")
     for cell in study.cells:
         row = [cell.held(of).text(3) for of in (0, 1)]
         for corners in (False, True):
@@ -57,8 +49,8 @@ def cells_table(study: CalibrationStudy) -> Table:
             row += (
                 ["", ""] if scatter is None else [scatter.coverage(0).text(3), scatter.area_ratio(0).text(2)]
             )
-        table.add_row(_named(cell), *row)
-    return table
+        result.add_row(_named(cell), *row)
+    return result
 
 
 def remarks(study: CalibrationStudy) -> Iterator[str]:

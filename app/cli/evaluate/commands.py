@@ -19,9 +19,9 @@ from ..options import (
     Topic,
     Workers,
     check_output,
-    console,
     numbers,
     settings_from,
+    to_file,
 )
 from ..progress import ForPrograms, progress
 from .agreement import agreement
@@ -48,50 +48,43 @@ evaluate = typer.Typer(
 evaluate.command("map")(evaluate_map)
 
 
-Rooms = Annotated[
-    list[str] | None,
-    typer.Option(help="a simulated world, or a rectangle in m such as 4.5x2.5; may be repeated"),
-]
-Noises = Annotated[
-    list[str] | None,
-    typer.Option(
-        metavar="RANGE,BEARING",
-        help="noise of the sensor: sigmas in m and rad, e.g. 0.02,0.0034; may be repeated",
-    ),
-]
-Segments = Annotated[
-    str, typer.Option(help="segments to use: known, found (by the real segmentation), or both")
-]
-Trials = Annotated[
-    int,
-    typer.Option(
-        min=1,
-        max=MOST,
-        help="corner trials in all, each by every method; "
-        "rounded up to whole blocks for each room, noise and segmentation",
-    ),
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(metavar="ADDRESS", help="a Dask scheduler, e.g. tcp://host:8786, whose workers do the work"),
-]
-StudyOutput = Annotated[
-    Path | None,
-    typer.Option("-o", "--output", help="FILE.html for a report; FILE.json or FILE.csv with every figure"),
-]
-
-
 @evaluate.command()
 def consistency(
-    room: Rooms = None,
-    noise: Noises = None,
-    segments: Segments = "both",
-    trials: Trials = 100_000,
+    room: Annotated[
+        list[str] | None,
+        typer.Option(help="a simulated world, or a rectangle in m such as 4.5x2.5; may be repeated"),
+    ] = None,
+    noise: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="RANGE,BEARING",
+            help="noise of the sensor: sigmas in m and rad, e.g. 0.02,0.0034; may be repeated",
+        ),
+    ] = None,
+    segments: Annotated[
+        str, typer.Option(help="segments to use: known, found (by the real segmentation), or both")
+    ] = "both",
+    trials: Annotated[
+        int,
+        typer.Option(
+            min=1,
+            max=MOST,
+            help="corner trials in all, each by every method; "
+            "rounded up to whole blocks for each room, noise and segmentation",
+        ),
+    ] = 100_000,
     beams: Annotated[int, typer.Option(min=90, max=100_000, help="beams in a revolution")] = 920,
     seed: Seed = 0,
     workers: Workers = None,
-    scheduler: Scheduler = None,
-    output: StudyOutput = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="a Dask scheduler, e.g. tcp://host:8786, whose workers do the work"
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None, to_file("FILE.html for a report; FILE.json or FILE.csv with every figure")
+    ] = None,
     by_room: Annotated[bool, typer.Option("--by-room", help="also print a table for each room")] = False,
     for_programs: ForPrograms = False,
 ) -> None:
@@ -125,6 +118,7 @@ def consistency(
 def _show(study: "Consistency", by_room: bool, seconds: float) -> None:
     from lidarcore import FITTERS
 
+    from ..tables import console
     from .consistency_table import tables
 
     terminal = console(WIDTH)
@@ -144,9 +138,7 @@ def repeatability(
     methods: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="fitters to compare; all if not given")
     ] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="FILE.json with every corner and wall, or FILE.csv")
-    ] = None,
+    output: Annotated[Path | None, to_file("FILE.json with every corner and wall, or FILE.csv")] = None,
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,
@@ -158,6 +150,7 @@ def repeatability(
     from lidarcore.evaluation.repeatability import tables as repeatability_tables
     from lidarcore.evaluation.repeatability.statistics import Repeatability
 
+    from ..tables import console
     from .repeatability_table import remarks, tables
 
     check_output(output, *consistency_tables.FORMATS)
@@ -177,13 +170,8 @@ def repeatability(
         repeatability_tables.write(summary, output)
 
 
-evaluate.command()(calibration)
-evaluate.command()(stations)
-evaluate.command()(agreement)
-evaluate.command()(honesty)
-evaluate.command()(endurance)
-evaluate.command()(relocation)
-evaluate.command()(walls)
+for command in (calibration, stations, agreement, honesty, endurance, relocation, walls):
+    evaluate.command()(command)
 
 
 def _noise(text: str) -> "SensorNoise":

@@ -11,6 +11,8 @@ from lidarcore.evaluation.consistency.study import ALL_ROOMS, Consistency, Row
 from lidarcore.evaluation.consistency.verdicts import verdict
 from lidarcore.noise import SensorNoise
 
+from ..tables import table
+
 COLOURS = {"true": "green", "open": "yellow", "too small": "red", "too large": "red"}
 
 
@@ -25,13 +27,9 @@ def tables(study: Consistency, by_room: bool) -> Iterator[Table]:
 
 
 def _table(title: str, rows: Iterable[Row]) -> Table:
-    table = Table(title=title, title_justify="left")
-    for heading in ("fitter", "covariance"):
-        table.add_column(heading, no_wrap=True)
-    for heading, _, _ in COLUMNS.values():
-        table.add_column(heading, justify="right")
+    result = table(title, ("fitter", "covariance"), [heading for heading, _, _ in COLUMNS.values()])
     for row in rows:
         cells = [cell(row.figures[name], factor, digits) for name, (_, factor, digits) in COLUMNS.items()]
         colour = COLOURS[verdict(row.figures["coverage_95"])]
-        table.add_row(row.fitter, f"[{colour}]{row.covariance}[/]", *cells)
-    return table
+        result.add_row(row.fitter, f"[{colour}]{row.covariance}[/]", *cells)
+    return result

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import Seed, Workers, check_output, console, plural
+from ..options import Seed, Workers, check_output, plural, to_file
 from ..progress import counted
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from lidarcore.evaluation.maps.honesty import Honesty
 
-_HEADINGS = ("", "in 95 %", "ANEES", "its band", "steps in band", "median")
+_FIGURES = ("in 95 %", "ANEES", "its band", "steps in band", "median")
 _ODOMETRY = {"wheels": "with odometry", "none": "without odometry"}
 _WIDTH = 120  # of the tables in a file or a pipe
 
@@ -27,9 +27,7 @@ def honesty(
     seconds: Annotated[float, typer.Option(min=2, max=3600, help="length of each drive, in s")] = 40.0,
     seed: Seed = 0,
     workers: Workers = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="FILE.json with every figure and its interval")
-    ] = None,
+    output: Annotated[Path | None, to_file("FILE.json with every figure and its interval")] = None,
 ) -> None:
     """Whether poses of maps from whole scans are as far off as their covariances say, in simulated worlds.
 
@@ -42,6 +40,8 @@ def honesty(
     from lidarcore.evaluation.maps.honesty import study_honesty
     from lidarcore.evaluation.repeatability.tables import json_text
     from lidarcore.simulation.worlds import WORLDS
+
+    from ..tables import console
 
     check_output(output, ".json")
     worlds = list(dict.fromkeys(world or WORLDS))
@@ -64,22 +64,19 @@ def honesty(
 
 
 def _table(found: "Honesty") -> "Table":
-    from rich.table import Table
-
     from lidarcore.evaluation.consistency.cells import cell
     from lidarcore.evaluation.consistency.verdicts import verdict
 
+    from ..tables import table
     from .consistency_table import COLOURS
 
-    table = Table()
-    for heading in _HEADINGS:
-        table.add_column(heading, justify="right" if heading else "left", no_wrap=True)
+    result = table(None, ("",), _FIGURES)
     for name, judged in found.judged.items():
-        table.add_row(
+        result.add_row(
             f"[{COLOURS[verdict(judged.coverage)]}]{name}[/]",
             cell(judged.coverage, 1.0, 3),
             cell(judged.anees, 1.0, 2),
             "{:.2f} to {:.2f}".format(*judged.band),
             *((f"{100 * judged.steps:.0f} %", f"{judged.median:.2f}") if judged.median >= 0 else ("–", "–")),
         )
-    return table
+    return result

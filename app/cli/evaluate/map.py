@@ -6,9 +6,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, counting, numbers, settings_from
+from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, numbers, settings_from
+from ..progress import counting
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lidarcore import Array
     from lidarcore.evaluation.maps.study import MapStudy
 
@@ -63,43 +66,29 @@ def evaluate_map(
             typer.echo(f"{name:26} {value}")
 
 
-def lines(judged: "MapStudy") -> list[tuple[str, str]]:
+def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
     """The figures, by what they are called."""
     import numpy as np
 
-    told = [
-        ("scans", f"{judged.scans}, {judged.tracked} of them tracked; {judged.keyframes} keyframes"),
-        (
-            "loops",
-            f"{judged.loops}" if judged.wrong is None else f"{judged.loops}, {judged.wrong} of them wrong",
-        ),
-        ("processor time", f"{judged.seconds:.1f} s; at most {judged.megabytes:.0f} MB"),
-    ]
+    yield "scans", f"{judged.scans}, {judged.tracked} of them tracked; {judged.keyframes} keyframes"
+    wrong = "" if judged.wrong is None else f", {judged.wrong} of them wrong"
+    yield "loops", f"{judged.loops}{wrong}"
+    yield "processor time", f"{judged.seconds:.1f} s; at most {judged.megabytes:.0f} MB"
     if len(judged.pairs):
-        mean, worst = judged.pairs.mean(axis=0), judged.pairs.max(axis=0)
-        told += [
-            (
-                "relative poses",
-                f"{len(judged.pairs)} pairs: mean {mean[0]:.4f} m, {np.rad2deg(mean[1]):.3f} degrees; "
-                f"largest {worst[0]:.3f} m, {np.rad2deg(worst[1]):.2f} degrees",
-            ),
-        ]
+        yield "relative poses", f"{len(judged.pairs)} pairs: {_errors(judged.pairs)}"
     if len(judged.normalised):
-        told += [
-            (
-                "normalised error",
-                f"median {np.median(judged.normalised):.2f}; {np.median(judged.allowed):.2f} where the reference is "
-                f"allowed its own error (honest: 2.37)",
-            ),
-        ]
+        median, allowed = np.median(judged.normalised), np.median(judged.allowed)
+        yield (
+            "normalised error",
+            f"median {median:.2f}; {allowed:.2f} where the reference is allowed its own error (honest: 2.37)",
+        )
     found = judged.relations
     at_scans = found[found[:, 2] <= _AT_A_SCAN]
     if len(found):
-        told.append(("relations verified by hand", f"{len(found)}, poses interpolated: {_errors(found)}"))
+        yield "relations verified by hand", f"{len(found)}, poses interpolated: {_errors(found)}"
     if 0 < len(at_scans) < len(found):
         within = f"{1e3 * _AT_A_SCAN:g} ms of a scan"
-        told.append(("  of these", f"{len(at_scans)} with both stamps within {within}: {_errors(at_scans)}"))
-    return told
+        yield "  of these", f"{len(at_scans)} with both stamps within {within}: {_errors(at_scans)}"
 
 
 def _errors(off: "Array") -> str:

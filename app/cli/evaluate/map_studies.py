@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import RecordingPath, Set, SettingsFile, Topic, counting, settings_from
+from ..options import RecordingPath, Set, SettingsFile, Topic, settings_from
+from ..progress import counting
 
 if TYPE_CHECKING:
     from lidarcore.evaluation.maps.relocation import Attempts

@@ -7,6 +7,7 @@ from rich.table import Table
 from lidarcore.evaluation.intervals import Interval
 from lidarcore.evaluation.repeatability.summary import Box, Claim, Method, Summary, has_other_tails
 
+from ..tables import table
 from .consistency_table import COLOURS
 
 MICRO = 1e6  # mm² in a m², mrad mm in a rad m
@@ -34,15 +35,12 @@ def remarks(summary: Summary) -> Iterator[str]:
 
 
 def _table(title: str, what: str, unit: str, methods: Sequence[tuple[Method, Sized]]) -> Table:
-    result = Table(
-        title=f"{title}: median one-sigma ellipse of a scan, and the scatter, {unit}", title_justify="left"
+    claims = (what, "claimed", "quartiles", "scatter", "claimed / scatter, geometric mean")
+    result = table(
+        f"{title}: median one-sigma ellipse of a scan, and the scatter, {unit}",
+        ("fitter", "covariance"),
+        (*claims, "in 50 %", "in 95 %", "in 99 %"),
     )
-    for heading in ("fitter", "covariance"):
-        result.add_column(heading, no_wrap=True)
-    for heading in (
-        what, "claimed", "quartiles", "scatter", "claimed / scatter, geometric mean", "in 50 %", "in 95 %", "in 99 %",
-    ):  # fmt: skip
-        result.add_column(heading, justify="right")
     result.add_column("ellipses are", no_wrap=True)
     for method, features in methods:
         for kind, claim in method.claims.items():

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, Set, SettingsFile, check_output, console, counting, settings_from
+from ..options import MOST, Given, Set, SettingsFile, TopicOfAll, check_output, settings_from, to_file
+from ..progress import counting
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -20,16 +21,12 @@ def stations(
     recordings: Annotated[list[Path], typer.Argument(help="recordings of sensors that stood still")],
     methods: Annotated[str, typer.Option(metavar="NAME,...", help="fitters to judge")] = "ml,utls",
     window: Annotated[int, typer.Option(min=10, max=MOST, help="scans that are judged together")] = 100,
-    given: Annotated[
-        bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
-    ] = False,
+    given: Given = False,
     by_station: Annotated[
         bool, typer.Option("--by-station", help="also print a table for each station")
     ] = False,
-    topic: Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")] = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="FILE.json with the figures of every station")
-    ] = None,
+    topic: TopicOfAll = None,
+    output: Annotated[Path | None, to_file("FILE.json with the figures of every station")] = None,
     settings: SettingsFile = None,
     set_: Set = None,
 ) -> None:
@@ -40,7 +37,8 @@ def stations(
     from lidarcore.evaluation.stations import tables as station_tables
     from lidarcore.evaluation.stations.study import study
 
-    from .stations_table import limits_table, station_table, table
+    from ..tables import console
+    from .stations_table import limits_table, methods_table, station_table
 
     check_output(output, ".json")
     names = [name.strip() for name in methods.split(",")]
@@ -55,7 +53,7 @@ def stations(
             tell=tell,
         )
     terminal = console(WIDTH)
-    terminal.print(table(found))
+    terminal.print(methods_table(found))
     terminal.print(limits_table(found))
     if by_station:
         terminal.print(station_table(found))

@@ -6,24 +6,17 @@ from lidarcore.evaluation.intervals import Interval
 from lidarcore.evaluation.stations.limits import REFERENCE, limits
 from lidarcore.evaluation.stations.study import Figures, StationStudy
 
+from ..tables import table
 
-def table(study: StationStudy) -> Table:
+
+def methods_table(study: StationStudy) -> Table:
     """Every method's walls and corners, all stations together."""
-    result = Table(
-        title=f"{len(study.stations)} stations: 95 % ellipses against the scatter", title_justify="left"
+    shares = ("in 95 %", "lowest, highest station", "claimed / scatter", f"scatter / {REFERENCE}")
+    result = table(
+        f"{len(study.stations)} stations: 95 % ellipses against the scatter",
+        ("of", "fitter"),
+        (*shares, "features", "seen"),
     )
-    result.add_column("of")
-    result.add_column("fitter", no_wrap=True)
-    headings = (
-        "in 95 %",
-        "lowest, highest station",
-        "claimed / scatter",
-        f"scatter / {REFERENCE}",
-        "features",
-        "seen",
-    )
-    for heading in headings:
-        result.add_column(heading, justify="right")
     for name, figures in (("walls", study.walls), ("corners", study.corners)):
         for m, method in enumerate(study.methods):
             extremes = figures.extremes(m)
@@ -43,11 +36,7 @@ def table(study: StationStudy) -> Table:
 
 def limits_table(study: StationStudy) -> Table:
     """The first method's figures beside what is asked of them."""
-    result = Table(title=f"Asked of {study.methods[0]}", title_justify="left")
-    for heading in ("of", "figure"):
-        result.add_column(heading)
-    for heading in ("measured", "asked", ""):
-        result.add_column(heading, justify="right")
+    result = table(f"Asked of {study.methods[0]}", ("of", "figure"), ("measured", "asked", ""))
     for limit in limits(study, study.methods[0]):
         asked = "–".join(f"{end:g}" for end in (limit.low, limit.high) if end is not None)
         sign = (
@@ -61,10 +50,8 @@ def limits_table(study: StationStudy) -> Table:
 
 def station_table(study: StationStudy) -> Table:
     """The first method's coverage at each station, and the noise it was judged with."""
-    result = Table(title=f"By station, {study.methods[0]}", title_justify="left")
-    result.add_column("station")
-    for heading in ("scans", "walls in 95 %", "seen", "corners in 95 %", "seen", "noise"):
-        result.add_column(heading, justify="right")
+    figures = ("scans", "walls in 95 %", "seen", "corners in 95 %", "seen", "noise")
+    result = table(f"By station, {study.methods[0]}", ("station",), figures)
     walls, corners = study.walls.by_station(0), study.corners.by_station(0)
     for number, station in enumerate(study.stations):
         cells = [_held(held.get(number)) for held in (walls, corners)]

@@ -1,20 +1,22 @@
-"""The current frame, its segments and its corners."""
+"""The current frame, its segments, its corners and its clusters."""
 
+from dataclasses import replace
 from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, WebSocket
 from starlette.responses import Response
 
 from lidarcore import Features
+from lidarcore.clusters import CLUSTERERS, cluster
 
 from ...errors import NotFoundError
 from ...pipeline.frame import Frame
 from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns, csv_text, values
+from ..openapi import formats
 from ..problems import documented, encode
-from ..schemas import CornerJson, FrameJson, SegmentJson
-from ..serializers import corners_json, frame_text, segments_json
-from .dependencies import CurrentFrame, CurrentHub
-from .examples import CORNER, FRAME, SEGMENT, ok
+from ..schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
+from ..serializers import clusters_json, corners_json, frame_text, segments_json
+from .dependencies import CurrentFrame, Server
 
 router = APIRouter(tags=["frame"], responses=documented(404, 422))
 
@@ -22,10 +24,14 @@ Fitter = Annotated[
     str | None, Query(description="a method of the frame; the main one if not given", examples=["ml"])
 ]
 Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with a header")]
+Method = Annotated[
+    str | None,
+    Query(description="a clustering method; the one of the settings if not given", examples=["dbscan"]),
+]
 Points = Annotated[bool, Query(description="with the measured points")]
 
 
-@router.get("/frame", response_model=FrameJson, responses=ok(FRAME, "The newest frame"))
+@router.get("/frame", response_model=FrameJson, response_description="The newest frame")
 def frame(frame: CurrentFrame, points: Points = False) -> Response:
     """Everything found in the newest scan, by every method that runs."""
     return Response(frame_text(frame, points), media_type="application/json")
@@ -34,7 +40,8 @@ def frame(frame: CurrentFrame, points: Points = False) -> Response:
 @router.get(
     "/segments",
     response_model=list[SegmentJson],
-    responses=ok([SEGMENT], "The segments of the newest scan", csv="id,alpha,r,x_start,y_start,..."),
+    response_description="The segments of the newest scan",
+    responses=formats(csv="id,alpha,r,x_start,y_start,..."),
 )
 def segments(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json") -> Response:
     """The segments by one method, in the order of the ring. Metres and radians, sensor frame."""
@@ -47,28 +54,38 @@ def segments(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json"
 @router.get(
     "/corners",
     response_model=list[CornerJson],
-    responses=ok([CORNER], "The corners of the newest scan", csv="id,segment_1,segment_2,x,y,..."),
+    response_description="The corners of the newest scan",
+    responses=formats(csv="id,segment_1,segment_2,x,y,..."),
 )
 def corners(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json") -> Response:
     """The corners that one method found; ids last from frame to frame. Metres and radians, sensor frame."""
     found, name = _features(frame, fitter), fitter or next(iter(frame.features))
-    rows = sorted((row for row in frame.corners if name in row.index), key=lambda row: row.index[name])
     if format == "csv":
-        return _csv([row.id for row in rows], CORNER_COLUMNS, found)
-    wanted = {row.id for row in rows}
-    only = [
-        row | {"by_method": {name: row["by_method"][name]}}
-        for row in corners_json(frame)
-        if row["id"] in wanted
-    ]
-    return encode(only)
+        ids = {row.index[name]: row.id for row in frame.corners if name in row.index}
+        return _csv([ids[i] for i in range(len(found.corners))], CORNER_COLUMNS, found)
+    by_it = [row for row in corners_json(frame) if name in row["by_method"]]
+    return encode([row | {"by_method": {name: row["by_method"][name]}} for row in by_it])
+
+
+@router.get(
+    "/clusters",
+    response_model=list[ClusterJson],
+    response_description="The clusters of the newest scan",
+)
+def clusters(frame: CurrentFrame, method: Method = None) -> Response:
+    """The clusters of the newest scan, found when asked for. Metres, sensor frame."""
+    if method is not None and method not in CLUSTERERS:
+        raise NotFoundError(f"There is no clustering method {method!r}: choose from {', '.join(CLUSTERERS)}.")
+    wanted = frame.settings.clusters
+    chosen = replace(wanted, method=method or wanted.method)
+    return encode(clusters_json(cluster(frame.scan, chosen)))
 
 
 @router.websocket("/stream")
-async def stream(websocket: WebSocket, hub: CurrentHub, points: Points = False) -> None:
+async def stream(server: Server, websocket: WebSocket, points: Points = False) -> None:
     """Frames and changes of state as they happen, newest first; a slow client gets fewer, never old ones."""
     await websocket.accept()
-    await hub.serve(websocket, points)
+    await server.hub.serve(websocket, points)
 
 
 def _features(frame: Frame, fitter: str | None) -> Features:

@@ -19,9 +19,9 @@ from lidarcore.mapping.walls import Walls
 
 from ...errors import NotFoundError
 from ...pipeline.runtime import Runtime
+from ..openapi import MEDIA_TYPES
 from ..problems import documented
-from .dependencies import CurrentRuntime, Heavy
-from .examples import MEDIA_TYPES
+from .dependencies import Server
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422))
 
@@ -52,8 +52,7 @@ def running_walls(runtime: Runtime) -> Walls:
     responses={200: {"description": "The map", "content": {"image/png": {}, "application/zip": {}}}},
 )
 async def grid(
-    runtime: CurrentRuntime,
-    heavy: Heavy,
+    server: Server,
     format: Annotated[
         Literal["png", "zip"], Query(description="the grid as a picture, or all files of `lidarcore map`")
     ] = "png",
@@ -65,9 +64,11 @@ async def grid(
     zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF.
     404 if SLAM makes no map of whole scans, or has no walls yet.
     """
-    found = running_picture(runtime).grid
-    make = partial(_zip, found, running_walls(runtime)) if format == "zip" else partial(_grid_png, found)
-    return await anyio.to_thread.run_sync(make, limiter=heavy)
+    found = running_picture(server.runtime).grid
+    make = (
+        partial(_zip, found, running_walls(server.runtime)) if format == "zip" else partial(_grid_png, found)
+    )
+    return await anyio.to_thread.run_sync(make, limiter=server.heavy)
 
 
 def _zip(grid: OccupancyGrid, walls: Walls) -> Response:

@@ -19,15 +19,16 @@ from lidarcore.landmarks import (
     Landmark,
     LandmarkMap,
     Metric,
+    Neighbour,
     write_landmarks,
 )
 
 from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
+from ..openapi import MEDIA_TYPES, formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
-from .dependencies import CurrentLandmarks
-from .examples import LANDMARK, MEDIA_TYPES, ok
+from .dependencies import Server
 
 MOST, USUAL = 1000, 100  # landmarks of a page
 
@@ -40,14 +41,9 @@ class LandmarksJson(TypedDict):
     next: int | None
 
 
-class NeighbourJson(TypedDict):
-    distance: float
-    landmark: Landmark
-
-
 class NeighboursJson(TypedDict):
     session: int
-    neighbours: list[NeighbourJson]
+    neighbours: list[Neighbour]
 
 
 class LandmarkHistoryJson(TypedDict):
@@ -58,10 +54,6 @@ class LandmarkHistoryJson(TypedDict):
     history: list[Landmark]
     next: float | None
 
-
-PAGE = {"session": 3, "landmarks": [LANDMARK], "next": 41}
-NEIGHBOURS = {"session": 3, "neighbours": [{"distance": 0.412, "landmark": LANDMARK}]}
-HISTORY = {"session": 3, "landmark": LANDMARK, "history": [LANDMARK], "next": None}
 
 Metres = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE, allow_inf_nan=False)]
 
@@ -138,16 +130,14 @@ Limit = Annotated[int, Query(ge=1, le=MOST, description="at most so many")]
 @router.get(
     "",
     response_model=LandmarksJson,
-    responses=ok(
-        PAGE,
-        "A page; for the one after it give `next` as `after`, or follow the Link header",
-        csv="x_m,y_m,var_x_m2,cov_xy_m2,...",
-        geojson={"type": "FeatureCollection", "features": []},
+    response_description="A page; for the one after it give `next` as `after`, or follow the Link header",
+    responses=formats(
+        csv="x_m,y_m,var_x_m2,cov_xy_m2,...", geojson={"type": "FeatureCollection", "features": []}
     ),
 )
 def find(
+    server: Server,
     request: Request,
-    landmarks: CurrentLandmarks,
     region: Region,
     which: Which,
     limit: Limit = USUAL,
@@ -156,7 +146,7 @@ def find(
     format: Annotated[Literal["json", "csv", "geojson"], Query(description="of the answer")] = "json",
 ) -> Response:
     """Landmarks in a box or a circle, or anywhere, in the order of their ids. Metres, world frame of the session."""
-    landmark_map = chosen_map(landmarks, session)
+    landmark_map = chosen_map(server.landmarks, session)
     page = landmark_map.find(region, which, after, limit)
     if format == "json":
         answer = encode({"session": landmark_map.session, "landmarks": page.landmarks, "next": page.next})
@@ -170,9 +160,9 @@ def find(
     return answer
 
 
-@router.get("/nearest", response_model=NeighboursJson, responses=ok(NEIGHBOURS, "The nearest first"))
+@router.get("/nearest", response_model=NeighboursJson, response_description="The nearest first")
 def nearest(
-    landmarks: CurrentLandmarks,
+    server: Server,
     which: Which,
     x: Annotated[Metres, Query(description="m", examples=[1.0])],
     y: Annotated[Metres, Query(description="m", examples=[0.5])],
@@ -187,21 +177,21 @@ def nearest(
     session: SessionId = None,
 ) -> Response:
     """The k landmarks nearest to a point."""
-    landmark_map = chosen_map(landmarks, session)
+    landmark_map = chosen_map(server.landmarks, session)
     noise = [[sigma**2, 0.0], [0.0, sigma**2]] if sigma else None
     found = landmark_map.nearest((x, y), k, which, within, metric, noise)
     return encode({"session": landmark_map.session, "neighbours": found})
 
 
-@router.get("/{id}", response_model=LandmarkHistoryJson, responses=ok(HISTORY, "The landmark"))
+@router.get("/{id}", response_model=LandmarkHistoryJson, response_description="The landmark")
 def read(
-    landmarks: CurrentLandmarks,
+    server: Server,
     id: int,
     after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
     limit: Limit = USUAL,
 ) -> Response:
     """One landmark, and what it was in each second in which it was seen, the oldest first; also if it was removed."""
-    landmark_map = landmarks.atlas.holding(id)
+    landmark_map = server.landmarks.atlas.holding(id)
     history = landmark_map.history(id, after, limit)
     return encode(
         {
@@ -214,9 +204,9 @@ def read(
 
 
 @router.delete("", status_code=204)
-def clear(landmarks: CurrentLandmarks, session: SessionId = None) -> None:
+def clear(server: Server, session: SessionId = None) -> None:
     """Give up the landmarks of a map and their history. What a run goes on seeing comes back: reset it before."""
-    chosen_map(landmarks, session).clear()
+    chosen_map(server.landmarks, session).clear()
 
 
 def _present(landmark_map: LandmarkMap, id: int) -> Landmark | None:

@@ -1,5 +1,6 @@
 """Where the sensor is: pose, trajectory, initial pose, odometry from outside, the map to localize in."""
 
+from dataclasses import fields
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,29 +14,19 @@ from ...pipeline.navigation import LocalizationStatus, Navigation
 from ...pipeline.runtime import Runtime
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
+from ...records import record
+from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Body as Model
 from ..schemas import Coordinate, Matrix3, Number, OdometryPose, Row3
 from ..serializers import pose_json
-from .dependencies import CurrentRuntime
-from .examples import ok
+from .dependencies import Server
 
 router = APIRouter(tags=["localization"], responses=documented(422))
 
 SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
 MOST_POSES = 10_000
-
-COVARIANCE = [[0.0004, 0.0, 0.0], [0.0, 0.0004, 0.0], [0.0, 0.0, 0.0001]]
-POSE = {
-    "stamp": 1795255000.1, "mode": "slam", "state": "tracking", "message": None, "x": 1.204, "y": -0.311,
-    "heading": 0.52, "covariance": COVARIANCE, "nis": 21.3, "dof": 24,
-}  # fmt: skip
-ROW = {
-    "stamp": 1795255000.1, "x": 1.204, "y": -0.311, "heading": 0.52,
-    "sigma_x": 0.004, "sigma_y": 0.005, "sigma_heading": 0.002,
-}  # fmt: skip
-FED = {"taken": 1204, "refused": 0, "dropped": 0, "stamp": 1795255000.1, "used": True, "problem": None}
-STATE = {"mode": "slam", "method": "landmarks", "session": 3, "map": None, "problem": None, "odometry": FED}
+COLUMNS = [field.name for field in fields(TrackedPose)]
 ODOMETRY = {"stamp": 1795255000.1, "x": 1.2, "y": -0.3, "heading": 0.5}
 ONE = OdometryPose.model_json_schema()
 ONE_OR_SOME = {"anyOf": [ONE, {"type": "array", "items": ONE}], "examples": [ODOMETRY]}
@@ -82,79 +73,71 @@ Limit = Annotated[int, Query(ge=1, le=MOST_POSES, description="at most so many, 
 Format = Annotated[Literal["json", "csv"], Query(description="JSON, or CSV with a header")]
 
 
-@router.get("/localization", responses=ok(STATE, "What is localized, and in which map"))
-def read(runtime: CurrentRuntime) -> LocalizationStatus:
+@router.get("/localization", response_description="What is localized, and in which map")
+def read(server: Server) -> LocalizationStatus:
     """Whether the pose is estimated, and in which map."""
-    return runtime.localization()
+    return server.runtime.localization()
 
 
-@router.post("/localization/reset", responses=ok(STATE, "What is localized now"))
-def reset(runtime: CurrentRuntime) -> LocalizationStatus:
+@router.post("/localization/reset", response_description="What is localized now")
+def reset(server: Server) -> LocalizationStatus:
     """Start over: SLAM with an empty map in a new session, localization from nothing."""
-    runtime.navigate(Navigation.reset)
-    return runtime.localization()
+    server.runtime.navigate(Navigation.reset)
+    return server.runtime.localization()
 
 
-@router.put("/localization/map", responses=ok(STATE, "What is localized in") | documented(404))
+@router.put("/localization/map", response_description="What is localized in", responses=documented(404))
 def choose_map(
-    runtime: CurrentRuntime, choice: Annotated[MapChoice, Body(examples=[{"session": 3}])]
+    server: Server, choice: Annotated[MapChoice, Body(examples=[{"session": 3}])]
 ) -> LocalizationStatus:
     """Choose the map to localize in; the mode stays what it is."""
-    runtime.navigate(lambda navigation: navigation.choose_map(choice.session))
-    return runtime.localization()
+    server.runtime.navigate(lambda navigation: navigation.choose_map(choice.session))
+    return server.runtime.localization()
 
 
-@router.get("/pose", responses=ok(POSE, "The pose after the newest scan") | documented(404))
-def pose(runtime: CurrentRuntime) -> CurrentPoseJson:
+@router.get("/pose", response_description="The pose after the newest scan", responses=documented(404))
+def pose(server: Server) -> CurrentPoseJson:
     """Where the sensor is."""
-    localization = runtime.frame.localization if runtime.frame else None
+    localization = server.runtime.frame.localization if server.runtime.frame else None
     if localization is None:
-        raise NotFoundError(f"There is no pose: {_why(runtime)}")
+        raise NotFoundError(f"There is no pose: {_why(server.runtime)}")
     found = localization.tracking
-    return {
-        "stamp": found.stamp,
-        "mode": found.mode,
-        "state": found.state,
-        "message": found.message,
-        **pose_json(found.estimate.pose),
-        "covariance": found.estimate.covariance.tolist(),
-        "nis": found.nis,
-        "dof": found.dof,
-    }
+    estimate = found.estimate
+    return record(CurrentPoseJson, found, **pose_json(estimate.pose), covariance=estimate.covariance.tolist())
 
 
-@router.post("/pose", responses=ok(STATE, "The pose is set") | documented(409))
+@router.post("/pose", response_description="The pose is set", responses=documented(409))
 def place(
-    runtime: CurrentRuntime,
+    server: Server,
     pose: Annotated[InitialPose, Body(examples=[{"x": 1.0, "y": 0.5, "heading": 0.0}])],
 ) -> LocalizationStatus:
     """Tell where the sensor is. 409 if nothing is localized, or the map is made of whole scans."""
     variances = [pose.sigma_position**2, pose.sigma_position**2, pose.sigma_heading**2]
     covariance = np.diag(variances) if pose.covariance is None else np.array(pose.covariance)
-    wanted, at = runtime.settings.navigation, (pose.x, pose.y, pose.heading)
-    runtime.navigate(lambda navigation: navigation.place(at, covariance, wanted))
-    return runtime.localization()
+    wanted, at = server.runtime.settings.navigation, (pose.x, pose.y, pose.heading)
+    server.runtime.navigate(lambda navigation: navigation.place(at, covariance, wanted))
+    return server.runtime.localization()
 
 
 @router.get(
     "/trajectory",
     response_model=TrajectoryJson,
-    responses=ok({"poses": [ROW]}, "The poses of this run, the oldest first", csv=",".join(ROW)),
+    response_description="The poses of this run, the oldest first",
+    responses=formats(csv=",".join(COLUMNS)),
 )
-def trajectory(
-    runtime: CurrentRuntime, since: Since = None, limit: Limit = 1000, format: Format = "json"
-) -> Response:
+def trajectory(server: Server, since: Since = None, limit: Limit = 1000, format: Format = "json") -> Response:
     """Where the sensor has been in this run, as the filter had it at each moment; empty if nothing is localized."""
-    rows = [row for row in runtime.navigation.trajectory if since is None or row.stamp > since][-limit:]
+    poses = server.runtime.navigation.trajectory
+    rows = [row for row in poses if since is None or row.stamp > since][-limit:]
     if format == "csv":
-        columns = {name: [getattr(row, name) for row in rows] for name in ROW}
+        columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
         return Response(csv_text(columns), media_type="text/csv")
     return encode({"poses": rows})
 
 
 @router.post("/odometry", status_code=204)
 def odometry(
-    runtime: CurrentRuntime,
+    server: Server,
     poses: Annotated[Any, WithJsonSchema(ONE_OR_SOME), Body()],
 ) -> None:
     """Feed T_odom_sensor, one pose or some in their order; stamps are Unix seconds, as those of the scans.
@@ -163,7 +146,7 @@ def odometry(
     More than a thousand a second are left out. GET /localization tells what became of them.
     """
     for pose in _poses(poses):
-        runtime.feed(pose.stamp, (pose.x, pose.y, pose.heading))
+        server.runtime.feed(pose.stamp, (pose.x, pose.y, pose.heading))
 
 
 def _poses(body: Any) -> list[OdometryPose]:

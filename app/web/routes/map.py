@@ -17,9 +17,9 @@ from lidarcore.landmarks import Session, export_map, export_picture
 from lidarcore.mapping.grid import shades_of, write_ros_map
 
 from ...jobs.landmark_store import LandmarkStore
+from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
-from .dependencies import CurrentLandmarks, Heavy
-from .examples import LANDMARK, MEDIA_TYPES, SESSION, ok
+from .dependencies import Server
 from .landmarks import SessionId, chosen_map
 
 MAX_BYTES = 32 << 20  # of a map that is loaded, some 150,000 landmarks
@@ -28,7 +28,7 @@ PICTURES = ("png", "zip")
 
 router = APIRouter(prefix="/map", tags=["landmarks"], responses=documented(422, 503))
 
-EXAMPLE = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [LANDMARK]}
+EXAMPLE = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [example("Landmark")]}
 CSV = "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind,method,count,first_seen_s,last_seen_s,id\r\n..."
 FILES: dict[str, Any] = {
     "application/json": {"schema": {"type": "object", "examples": [EXAMPLE]}},
@@ -41,14 +41,12 @@ FILES: dict[str, Any] = {
 @router.get(
     "",
     response_class=FileResponse,
-    responses=ok(
-        EXAMPLE, "The map as a file", csv=CSV, geojson={"type": "FeatureCollection"}, png="...", zip="..."
-    )
+    response_description="The map as a file",
+    responses=formats(json=EXAMPLE, csv=CSV, geojson={"type": "FeatureCollection"}, png="...", zip="...")
     | documented(404),
 )
 async def download(
-    landmarks: CurrentLandmarks,
-    heavy: Heavy,
+    server: Server,
     session: SessionId = None,
     format: Annotated[
         Literal["json", "csv", "geojson", "png", "zip"],
@@ -60,19 +58,20 @@ async def download(
 
     If it has an occupancy grid, the picture is of that, in its own resolution.
     """
-    make = partial(_file, landmarks, session, format, resolution)
-    return await anyio.to_thread.run_sync(make, limiter=heavy)
+    make = partial(_file, server.landmarks, session, format, resolution)
+    return await anyio.to_thread.run_sync(make, limiter=server.heavy)
 
 
 @router.post(
     "",
     status_code=201,
     openapi_extra={"requestBody": {"required": True, "content": FILES}},
-    responses=ok(SESSION, "The new session", 201) | documented(413),
+    response_description="The new session",
+    responses=documented(413),
 )
 async def upload(
+    server: Server,
     request: Request,
-    landmarks: CurrentLandmarks,
     format: Annotated[
         Literal["json", "csv", "geojson", "zip"],
         Query(
@@ -96,7 +95,7 @@ async def upload(
                 if file.tell() + len(chunk) > MAX_BYTES:
                     raise ProblemError(413, f"The map is larger than {MAX_BYTES} bytes.")
                 file.write(chunk)
-        return await run_in_threadpool(landmarks.load, path, format, name)
+        return await run_in_threadpool(server.landmarks.load, path, format, name)
 
 
 def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution: float) -> FileResponse:

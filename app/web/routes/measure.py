@@ -20,7 +20,6 @@ from ...pipeline.frame import Frame
 from ..problems import ProblemError, documented
 from ..schemas import Pair
 from .dependencies import CurrentFrame
-from .examples import ok
 
 router = APIRouter(prefix="/measure", tags=["frame"], responses=documented(404, 422))
 
@@ -79,19 +78,12 @@ class MeasureJson(TypedDict):
     angle_sigma: float | None
 
 
-EXAMPLE = {
-    "first": {"kind": "corner", "id": 12, "at": [3.1042, 1.9873]},
-    "second": {"kind": "wall", "id": 4, "at": [-0.3081, 1.9544]},
-    "distance": 3.4123, "sigma": 0.0091, "angle": None, "angle_sigma": None,
-}  # fmt: skip
-
-
 class _Found(NamedTuple):
     feature: Feature
     said: MeasuredFeatureJson
 
 
-@router.get("", responses=ok(EXAMPLE, "The distance, and the angle between walls"))
+@router.get("", response_description="The distance, and the angle between walls")
 def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
     """How far two corners or walls of the current frame, or of its map, are from each other, and how sure that is.
 

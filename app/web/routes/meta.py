@@ -11,9 +11,10 @@ from typing_extensions import TypedDict
 from lidarcore import FITTERS
 from lidarcore.clusters import CLUSTERERS
 
+from ...records import record
 from ...scene.palette import METHOD_STYLES
-from .dependencies import CurrentHub, CurrentRuntime
-from .examples import ok
+from ..openapi import formats
+from .dependencies import Server
 
 router = APIRouter(tags=["meta"])
 
@@ -66,55 +67,33 @@ class MethodsJson(TypedDict):
 
 METHODS: MethodsJson = {
     "fitters": [
-        {
-            "name": fitter.name,
-            "title": fitter.title,
-            "reference": fitter.reference,
-            "summary": fitter.summary,
-            "colour": METHOD_STYLES[fitter.name].dark,
-            "colour_light": METHOD_STYLES[fitter.name].light,
-            "dash": METHOD_STYLES[fitter.name].dash,
-        }
+        record(FitterJson, fitter, colour=style.dark, colour_light=style.light, dash=style.dash)
         for fitter in FITTERS.values()
+        for style in [METHOD_STYLES[fitter.name]]
     ],
     "clusterers": [
-        {
-            "name": clusterer.name,
-            "title": clusterer.title,
-            "reference": clusterer.reference,
-            "summary": clusterer.summary,
-            "parameters": [name for name in clusterer.parameters if name != "noise"],
-        }
-        for clusterer in CLUSTERERS.values()
+        record(ClustererJson, one, parameters=[name for name in one.parameters if name != "noise"])
+        for one in CLUSTERERS.values()
     ],
     "covariances": ["consistent", "published"],
 }
-HEALTH = {
-    "status": "ok",
-    "ready": True,
-    "uptime_s": 86.1,
-    "clients": 2,
-    "memory_bytes": 187000000,
-    "cpu_s": 4.2,
-}
-VERSION = {"version": "0.1.0", "python": "3.11.7", "viser": "1.1.1", "numba": "0.61.0"}
 
 
-@router.get("/health", responses=ok(HEALTH, "The server is running"))
-def health(runtime: CurrentRuntime, hub: CurrentHub) -> HealthJson:
+@router.get("/health", response_description="The server is running")
+def health(server: Server) -> HealthJson:
     """Whether the kernels are compiled, and what the process has used so far."""
     cpu = _process.cpu_times()
     return {
         "status": "ok",
-        "ready": runtime.ready,
+        "ready": server.runtime.ready,
         "uptime_s": time.time() - _process.create_time(),
-        "clients": hub.clients,
+        "clients": server.hub.clients,
         "memory_bytes": _process.memory_info().rss,
         "cpu_s": cpu.user + cpu.system,
     }
 
 
-@router.get("/version", responses=ok(VERSION, "Versions"))
+@router.get("/version", response_description="Versions")
 def version() -> VersionJson:
     """Versions of this project and of what its results and pictures depend on."""
     return {
@@ -125,7 +104,7 @@ def version() -> VersionJson:
     }
 
 
-@router.get("/methods", responses=ok(METHODS, "The methods"))
+@router.get("/methods", response_description="The methods", responses=formats(json=METHODS))
 def methods() -> MethodsJson:
     """The line fitters, the clustering methods and the kinds of covariance there are."""
     return METHODS

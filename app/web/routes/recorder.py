@@ -11,8 +11,7 @@ from ...jobs.recorder import RecorderStatus
 from ...sources.live import LiveSource
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime
-from .examples import RECORDER, ok
+from .dependencies import Server
 
 router = APIRouter(prefix="/recorder", tags=["recorder"])
 
@@ -28,39 +27,37 @@ class RecordingStart(StrictBody):
     raw: bool = Field(False, description="also the bytes from the port, in a file of their own")
 
 
-@router.get("", responses=ok(RECORDER, "What is recorded, or was recorded last"))
-def read(recorder: CurrentRecorder) -> RecorderStatus:
+@router.get("", response_description="What is recorded, or was recorded last")
+def read(server: Server) -> RecorderStatus:
     """What is recorded, or was recorded last."""
-    return recorder.status
+    return server.recorder.status
 
 
-@router.post("/start", responses=ok(RECORDER, "What is recorded now") | documented(409, 422, 507))
+@router.post("/start", response_description="What is recorded now", responses=documented(409, 422, 507))
 def start(
-    runtime: CurrentRuntime,
-    library: CurrentLibrary,
-    recorder: CurrentRecorder,
+    server: Server,
     start: Annotated[RecordingStart, Body(examples=[{}, {"name": "hall.mcap", "raw": True}])],
 ) -> RecorderStatus:
     """Record the live source from now on into the recordings folder, as MCAP that ROS 2 tools open."""
-    source = runtime.player.source
+    source = server.runtime.player.source
     if not source.live:
         raise ConflictError("A recording is playing: only a live source can be recorded.")
     sensor = source if isinstance(source, LiveSource) else None
     if start.raw and sensor is None:
         raise ConflictError("A simulation has no port, and so no bytes to record: leave raw out.")
     name = start.name or f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
-    path = library.new(name if name.endswith(SUFFIX) else name + SUFFIX)
-    raw = library.new(path.stem + RAW_SUFFIX) if start.raw else None
-    scale = runtime.settings.view.ellipse_scale
+    path = server.library.new(name if name.endswith(SUFFIX) else name + SUFFIX)
+    raw = server.library.new(path.stem + RAW_SUFFIX) if start.raw else None
+    scale = server.runtime.settings.view.ellipse_scale
     stream, model = (sensor.stream, sensor.device().name) if sensor else (None, "simulated robot")
-    recorder.start(path, raw=raw, stream=stream, sensor=model, ellipse_scale=scale)
-    runtime.announce()
-    return recorder.status
+    server.recorder.start(path, raw=raw, stream=stream, sensor=model, ellipse_scale=scale)
+    server.runtime.announce()
+    return server.recorder.status
 
 
-@router.post("/stop", responses=ok(RECORDER, "What was recorded"))
-def stop(runtime: CurrentRuntime, recorder: CurrentRecorder) -> RecorderStatus:
+@router.post("/stop", response_description="What was recorded")
+def stop(server: Server) -> RecorderStatus:
     """End the recording; without one this does nothing."""
-    status = recorder.stop()
-    runtime.announce()
+    status = server.recorder.stop()
+    server.runtime.announce()
     return status

@@ -9,11 +9,9 @@ from typing_extensions import TypedDict
 
 from ...sources.library import RecordingEntry
 from ...sources.recording_facts import RecordingFacts
-from ...sources.trash import UNDO_WITHIN
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import CurrentLibrary
-from .examples import RECORDING, ok
+from .dependencies import Server
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
 
@@ -36,36 +34,27 @@ class RecordingsJson(TypedDict):
     undo_within: float
 
 
-EXAMPLE = {
-    "folder": "recordings",
-    "max_bytes": 1 << 30,
-    "recordings": [RECORDING],
-    "undo_within": UNDO_WITHIN,
-}
-FACTS = {"format": "ROS 1 bag", "topics": ["/scan"], "scans": 812, "duration": 81.2, "problem": None}
-
-
-@router.get("", responses=ok(EXAMPLE, "What can be played"))
-def read(library: CurrentLibrary) -> RecordingsJson:
+@router.get("", response_description="What can be played")
+def read(server: Server) -> RecordingsJson:
     """What is in the recordings folder, how large an upload may be, and for how long (s) a deletion can be undone."""
     return {
-        "folder": str(library.folder),
-        "max_bytes": library.max_bytes,
-        "recordings": library.list(),
-        "undo_within": library.trash.undo_within,
+        "folder": str(server.library.folder),
+        "max_bytes": server.library.max_bytes,
+        "recordings": server.library.list(),
+        "undo_within": server.library.trash.undo_within,
     }
 
 
-@router.get("/{name}/facts", responses=ok(FACTS, "What it holds") | documented(404, 422))
-def facts(library: CurrentLibrary, name: Name) -> RecordingFacts:
+@router.get("/{name}/facts", response_description="What it holds", responses=documented(404, 422))
+def facts(server: Server, name: Name) -> RecordingFacts:
     """Format, lidars, scans and duration (s): the first time, all of the recording is read for that."""
-    return library.facts(name)
+    return server.library.facts(name)
 
 
-@router.post("/{name}/restore", responses=ok(RECORDING, "It is back") | documented(404, 409, 422, 507))
-def restore(library: CurrentLibrary, name: Name) -> RecordingEntry:
+@router.post("/{name}/restore", response_description="It is back", responses=documented(404, 409, 422, 507))
+def restore(server: Server, name: Name) -> RecordingEntry:
     """Take back a recording that was deleted less than `undo_within` seconds ago."""
-    return library.restore(name)
+    return server.library.restore(name)
 
 
 @router.get(
@@ -74,37 +63,38 @@ def restore(library: CurrentLibrary, name: Name) -> RecordingEntry:
     responses=documented(404, 409, 422)
     | {200: {"description": "The file", "content": {"application/octet-stream": {}}}},
 )
-def download(library: CurrentLibrary, name: Name) -> FileResponse:
+def download(server: Server, name: Name) -> FileResponse:
     """The recording as a file; 409 for a bag that is a folder."""
-    return FileResponse(library.file(name), filename=name, media_type="application/octet-stream")
+    return FileResponse(server.library.file(name), filename=name, media_type="application/octet-stream")
 
 
-@router.patch("/{name:path}", responses=ok(RECORDING, "Renamed") | documented(404, 409, 422, 507))
+@router.patch("/{name:path}", response_description="Renamed", responses=documented(404, 409, 422, 507))
 def rename(
-    library: CurrentLibrary, name: Name, change: Annotated[NewName, Body(examples=[{"name": "hall.bag"}])]
+    server: Server, name: Name, change: Annotated[NewName, Body(examples=[{"name": "hall.bag"}])]
 ) -> RecordingEntry:
     """Give a recording another name. If it plays, it goes on playing."""
-    return library.rename(name, change.name)
+    return server.library.rename(name, change.name)
 
 
 @router.put(
     "/{name:path}",
     status_code=201,
     openapi_extra=RAW_BODY,
-    responses=ok(RECORDING, "Stored and readable", 201) | documented(409, 413, 422, 507),
+    response_description="Stored and readable",
+    responses=documented(409, 413, 422, 507),
 )
 async def upload(
+    server: Server,
     request: Request,
-    library: CurrentLibrary,
     name: Name,
     overwrite: Annotated[bool, Query(description="replace a recording of that name")] = False,
 ) -> RecordingEntry:
     """Upload a recording: the body is the file. It is kept if all of it arrives and a reader takes it."""
-    library.check_size(int(request.headers.get("content-length", 0)))
-    return await library.add(name, request.stream(), overwrite=overwrite)
+    server.library.check_size(int(request.headers.get("content-length", 0)))
+    return await server.library.add(name, request.stream(), overwrite=overwrite)
 
 
 @router.delete("/{name:path}", status_code=204, responses=documented(404, 409, 422, 507))
-def delete(library: CurrentLibrary, name: Name) -> None:
+def delete(server: Server, name: Name) -> None:
     """Delete a recording. If it plays, what was read of it goes on playing. It can be restored for `undo_within` s."""
-    library.delete(name)
+    server.library.delete(name)

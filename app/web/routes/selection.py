@@ -5,14 +5,12 @@ from typing import Annotated, Self
 from fastapi import APIRouter, Body
 from pydantic import model_validator
 
+from ...pipeline.frame import Selection
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import CurrentRuntime
-from .examples import ok
+from .dependencies import Server
 
 router = APIRouter(prefix="/selection", tags=["selection"])
-
-EXAMPLE = {"corner": 12, "landmark": None}
 
 
 class SelectionBody(StrictBody):
@@ -28,20 +26,20 @@ class SelectionBody(StrictBody):
         return self
 
 
-@router.get("", responses=ok(EXAMPLE, "What is selected"))
-def read(runtime: CurrentRuntime) -> SelectionBody:
+@router.get("", response_description="What is selected")
+def read(server: Server) -> Selection:
     """Which corner and which landmark are selected, if any."""
-    return SelectionBody(corner=runtime.selection.corner, landmark=runtime.selection.landmark)
+    return server.runtime.selection
 
 
-@router.put("", responses=ok(EXAMPLE, "What is selected") | documented(404, 422))
+@router.put("", response_description="What is selected", responses=documented(404, 422))
 def select(
-    runtime: CurrentRuntime,
+    server: Server,
     selection: Annotated[SelectionBody, Body(examples=[{"corner": 12}])],
-) -> SelectionBody:
+) -> Selection:
     """Select a corner of the current frame or a landmark of the map by its id, or none."""
     if "corner" in selection.model_fields_set:
-        runtime.select_corner(selection.corner)
+        server.runtime.select_corner(selection.corner)
     if "landmark" in selection.model_fields_set:
-        runtime.select_landmark(selection.landmark)
-    return read(runtime)
+        server.runtime.select_landmark(selection.landmark)
+    return server.runtime.selection

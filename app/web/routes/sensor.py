@@ -10,11 +10,11 @@ from lidarcore.body_mask import Sector
 from lidarcore.rplidar import FoundDevice, find_devices
 
 from ...errors import ConflictError
+from ...records import record
 from ...sources.live import LiveSource
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import CurrentRuntime
-from .examples import DEVICE_FOUND, SUGGESTION, ok
+from .dependencies import Server
 
 router = APIRouter(tags=["sensor"])
 
@@ -52,7 +52,7 @@ class Fault(StrictBody):
     ]
 
 
-@router.get("/devices", responses=ok([DEVICE_FOUND], "The serial ports"))
+@router.get("/devices", response_description="The serial ports")
 def devices() -> list[FoundDeviceJson]:
     """The serial ports of this machine; those that look like an RPLIDAR are asked, which stops one left turning."""
     return [_found(device) for device in find_devices()]
@@ -60,34 +60,27 @@ def devices() -> list[FoundDeviceJson]:
 
 @router.get(
     "/sensor/mask/suggestion",
-    responses=ok(SUGGESTION, "Sectors for the setting `sensor.mask`") | documented(409),
+    response_description="Sectors for the setting `sensor.mask`",
+    responses=documented(409),
 )
-def suggest(runtime: CurrentRuntime) -> SuggestionJson:
+def suggest(server: Server) -> SuggestionJson:
     """Where the robot's own body is: near, and in its place while everything else moves. Nothing is changed.
 
     Asked of the last 20 s of a sensor, or of 200 scans of a recording as they were measured, without the present mask.
     409 if there are too few of them, or the sensor did not move enough to tell body and room apart.
     """
-    return {"mask": runtime.suggested_mask()}
+    return {"mask": server.runtime.suggested_mask()}
 
 
 @router.post("/emulator", status_code=204, responses=documented(409, 422))
-def obey(runtime: CurrentRuntime, fault: Annotated[Fault, Body(examples=[{"command": "lose 0.05"}])]) -> None:
+def obey(server: Server, fault: Annotated[Fault, Body(examples=[{"command": "lose 0.05"}])]) -> None:
     """Have the emulated sensor show a fault, to see what becomes of it."""
-    source = runtime.player.source
+    source = server.runtime.player.source
     if not isinstance(source, LiveSource) or source.emulator is None:
         raise ConflictError('No emulator is playing: PUT {"kind": "emulator"} to /api/v1/source first.')
     source.emulator.command(fault.command)
 
 
 def _found(device: FoundDevice) -> FoundDeviceJson:
-    return {
-        "path": device.path,
-        "description": device.description,
-        "vid_pid": device.vid_pid,
-        "looks_like": device.looks_like,
-        "name": device.info.name if device.info else None,
-        "serial": device.info.serial if device.info else None,
-        "error": device.error,
-        "in_use": device.in_use,
-    }
+    name, serial = (device.info.name, device.info.serial) if device.info else (None, None)
+    return record(FoundDeviceJson, device, name=name, serial=serial)

@@ -11,8 +11,7 @@ from lidarcore.landmarks import Session
 from ...errors import ConflictError
 from ...jobs.landmark_store import StoreStatus
 from ..problems import documented, encode
-from .dependencies import CurrentLandmarks
-from .examples import SESSION, ok
+from .dependencies import Server
 
 router = APIRouter(prefix="/sessions", tags=["landmarks"], responses=documented(503))
 
@@ -22,21 +21,17 @@ class SessionsJson(TypedDict):
     sessions: list[Session]
 
 
-STORE = {"path": "landmarks.db", "session": 3, "landmarks": 27, "behind_s": 0.0, "error": None}
-EXAMPLE = {"store": STORE, "sessions": [SESSION]}
-
-
-@router.get("", response_model=SessionsJson, responses=ok(EXAMPLE, "All sessions, the oldest first"))
-def read(landmarks: CurrentLandmarks) -> Response:
+@router.get("", response_model=SessionsJson, response_description="All sessions, the oldest first")
+def read(server: Server) -> Response:
     """The maps there are, and how well the running one gets to the disk."""
-    return encode({"store": landmarks.status, "sessions": landmarks.atlas.sessions()})
+    return encode({"store": server.landmarks.status, "sessions": server.landmarks.atlas.sessions()})
 
 
 @router.delete("/{id}", status_code=204, responses=documented(404, 409, 422))
-def delete(landmarks: CurrentLandmarks, id: Annotated[int, Path(examples=[3])]) -> None:
+def delete(server: Server, id: Annotated[int, Path(examples=[3])]) -> None:
     """Delete a session with its landmarks and their history. 409 for the one that is being written."""
-    if landmarks.writes(id):
+    if server.landmarks.writes(id):
         raise ConflictError(
             f"Session {id} is being written: reset localization to begin another one, or stop SLAM."
         )
-    landmarks.atlas.delete(id)
+    server.landmarks.atlas.delete(id)

@@ -17,11 +17,11 @@ from ...sources.player import SourceStatus
 from ...sources.recorded import RecordingSource
 from ...sources.simulated import SimulationSource
 from ...sources.source import Source
+from ..openapi import formats
 from ..problems import documented
 from ..schemas import Body as Model
 from ..schemas import Number, StrictBody
-from .dependencies import CurrentLibrary, CurrentRecorder, CurrentRuntime, CurrentTaps
-from .examples import SOURCE, ok
+from .dependencies import Server
 
 router = APIRouter(prefix="/source", tags=["source"])
 
@@ -144,18 +144,15 @@ SIMULATION: SimulationJson = {
 }
 
 
-@router.get("", responses=ok(SOURCE, "What plays, where it is, and how"))
-def read(runtime: CurrentRuntime) -> SourceStatus:
+@router.get("", response_description="What plays, where it is, and how")
+def read(server: Server) -> SourceStatus:
     """What plays, where it is, and how."""
-    return runtime.player.status()
+    return server.runtime.player.status()
 
 
-@router.put("", responses=ok(SOURCE, "What plays now") | documented(403, 404, 409, 422, 503, 504))
+@router.put("", response_description="What plays now", responses=documented(403, 404, 409, 422, 503, 504))
 def play(
-    runtime: CurrentRuntime,
-    library: CurrentLibrary,
-    recorder: CurrentRecorder,
-    taps: CurrentTaps,
+    server: Server,
     choice: Choice,
 ) -> SourceStatus:
     """Play a sensor, the emulator or a recording; a recording of the source before ends. If it fails, that goes on.
@@ -163,19 +160,23 @@ def play(
     409 with the member `topics` if the recording has several lidar topics and none was chosen.
     """
     if isinstance(choice, Recording):
-        source: Source = RecordingSource(library.path(choice.name), choice.topic)
+        source: Source = RecordingSource(server.library.path(choice.name), choice.topic)
         index, paused = choice.index, choice.paused
     elif isinstance(choice, Simulation):
-        source, index, paused = SimulationSource(choice.settings, taps.scan), 0, False
+        source, index, paused = SimulationSource(choice.settings, server.taps.scan), 0, False
     else:
         options = DeviceOptions(**choice.model_dump(exclude={"kind"}), emulated=choice.kind == "emulator")
-        source, index, paused = _live(runtime, options, taps), 0, False
-    recorder.stop()
-    runtime.open(source, index, paused)
-    return runtime.player.status()
+        source, index, paused = _live(server.runtime, options, server.taps), 0, False
+    server.recorder.stop()
+    server.runtime.open(source, index, paused)
+    return server.runtime.player.status()
 
 
-@router.get("/simulation", responses=ok(SIMULATION, "Worlds, and a JSON schema of the settings"))
+@router.get(
+    "/simulation",
+    response_description="Worlds, and a JSON schema of the settings",
+    responses=formats(json=SIMULATION),
+)
 def simulation() -> SimulationJson:
     """Where a simulated robot can drive, and what can be set about it."""
     return SIMULATION
@@ -184,37 +185,32 @@ def simulation() -> SimulationJson:
 def _live(runtime: Runtime, options: DeviceOptions, taps: Taps) -> LiveSource:
     """The sensor; the one that plays has to let go of its port first, and gets it back if that fails."""
     playing = runtime.player.source
-    holder = (
-        playing
-        if isinstance(playing, LiveSource) and not options.emulated and playing.holds(options.port)
-        else None
-    )
-    if holder:
-        holder.close()
+    if options.emulated or not isinstance(playing, LiveSource) or not playing.holds(options.port):
+        return LiveSource(options, taps)
+    playing.close()
     try:
         return LiveSource(options, taps)
     except DeviceError:
-        if holder:
-            runtime.open(LiveSource(holder.options, taps))
+        runtime.open(LiveSource(playing.options, taps))
         raise
 
 
-@router.patch("", responses=ok(SOURCE, "What plays, as it is now") | documented(422))
+@router.patch("", response_description="What plays, as it is now", responses=documented(422))
 def control(
-    runtime: CurrentRuntime,
+    server: Server,
     transport: Annotated[
         Transport, Body(examples=[{"state": "paused", "index": 41}, {"speed": 2.0, "loop": False}])
     ],
 ) -> SourceStatus:
     """Play, pause, seek, set speed and loop; or how fast the sensor turns."""
     if transport.rpm is not None:
-        runtime.player.source.set_speed(transport.rpm)
-    runtime.player.control(transport.state, transport.index, transport.speed, transport.loop)
-    return runtime.player.status()
+        server.runtime.player.source.set_speed(transport.rpm)
+    server.runtime.player.control(transport.state, transport.index, transport.speed, transport.loop)
+    return server.runtime.player.status()
 
 
-@router.post("/step", responses=ok(SOURCE, "What plays, as it is now") | documented(422))
-def step(runtime: CurrentRuntime, step: Annotated[Step, Body(examples=[{"by": -1}])]) -> SourceStatus:
+@router.post("/step", response_description="What plays, as it is now", responses=documented(422))
+def step(server: Server, step: Annotated[Step, Body(examples=[{"by": -1}])]) -> SourceStatus:
     """Pause, and go some scans on or back."""
-    runtime.player.step(step.by)
-    return runtime.player.status()
+    server.runtime.player.step(step.by)
+    return server.runtime.player.status()

@@ -1,18 +1,17 @@
 """Experiments of the papers, run on this machine, and their reports."""
 
-from collections.abc import Callable
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body, Depends, Path
+from fastapi import APIRouter, Body, Path
 from starlette.responses import FileResponse
 from typing_extensions import TypedDict
 
 from ...jobs.studies import ExpectedTime, StudyStatus, expected
-from ...jobs.study_kinds import KINDS, ConsistencyOptions, CornerOptions, DriveOptions, Options
+from ...jobs.study_kinds import KINDS, Kind
 from ...jobs.study_reports import ReportEntry
+from ...records import record
 from ..problems import documented
-from .dependencies import CurrentLibrary, CurrentRuntime, CurrentStudies
-from .examples import ok
+from .dependencies import Server
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 
@@ -41,114 +40,63 @@ class StudiesJson(TypedDict):
     reports: list[ReportEntry]
 
 
-RUN = {
-    "kind": "cwlf", "options": {"quick": True, "seed": 0, "noise": "usual"}, "state": "running", "elapsed_s": 4.1,
-    "remaining_s": 6.2, "done": 2, "total": 5, "error": None, "report": None,
-}  # fmt: skip
-REPORT = {
-    "name": "cwlf_2026-11-21_10-00-00", "kind": "cwlf", "created": "2026-11-21T10:00:09+00:00", "size": 412345,
-    "took_s": 9.3, "options": {"quick": True, "seed": 0, "noise": "usual"},
-}  # fmt: skip
-EXAMPLE = {
-    "folder": "studies",
-    "kinds": [
-        {
-            "name": "cwlf", "title": KINDS["cwlf"].title, "question": KINDS["cwlf"].question,
-            "expected_s": {"quick": 9.3, "full": 30.0}, "schema": {"type": "object", "properties": {}},
-        }
-    ],
-    "run": RUN,
-    "reports": [REPORT],
-}  # fmt: skip
-STARTED = ok(RUN, "What runs now") | documented(404, 409, 422, 507)
 HTML: dict[int | str, dict[str, Any]] = {
     200: {"description": "The report", "content": {"text/html": {"schema": {"type": "string"}}}}
 }
 
 
-def _starter(
-    studies: CurrentStudies, runtime: CurrentRuntime, library: CurrentLibrary
-) -> Callable[[str, Options], StudyStatus]:
-    """Starts a study of that kind with these options, under the noise set now."""
-
-    def start(kind: str, options: Options) -> StudyStatus:
-        noise = runtime.settings.extraction.noise
-        return studies.start(kind, options, options.arguments(noise, library.path), noise)
-
-    return start
-
-
-Start = Annotated[Callable[[str, Options], StudyStatus], Depends(_starter)]
-
-
-@router.get("", responses=ok(EXAMPLE, "Studies and reports"))
-def read(studies: CurrentStudies) -> StudiesJson:
+@router.get("", response_description="Studies and reports")
+def read(server: Server) -> StudiesJson:
     """The studies there are with their options, what runs, and the reports of those that are finished."""
-    run, reports = studies.run, studies.finished()
+    run, reports = server.studies.run, server.studies.finished()
     kinds: list[KindJson] = [
-        {
-            "name": kind.name,
-            "title": kind.title,
-            "question": kind.question,
-            "expected_s": expected(kind.name, reports),
-            "schema": kind.options.model_json_schema(),
-        }
+        record(
+            KindJson,
+            kind,
+            expected_s=expected(kind.name, reports),
+            schema=kind.options.model_json_schema(),
+        )
         for kind in KINDS.values()
     ]
-    return {"folder": str(studies.reports.folder), "kinds": kinds, "run": run, "reports": reports}
+    return {"folder": str(server.studies.reports.folder), "kinds": kinds, "run": run, "reports": reports}
 
 
-@router.post("/consistency", responses=STARTED)
-def consistency(
-    start: Start,
-    options: Annotated[
-        ConsistencyOptions, Body(examples=[{"quick": True}, {"trials": 50000, "noise": "settings"}])
-    ],
-) -> StudyStatus:
-    """Which ellipses can be believed: corners simulated with known truth, by every method. One study at a time."""
-    return start("consistency", options)
+def _add_start(kind: Kind) -> None:
+    @router.post(
+        f"/{kind.name}",
+        name=kind.name.replace("-", "_"),
+        description=f"{kind.does} One study at a time.",
+        response_description="What runs now",
+        responses=documented(404, 409, 422, 507),
+    )
+    def start(
+        server: Server,
+        options: Annotated[kind.options, Body(examples=list(kind.examples))],  # type: ignore[name-defined]
+    ) -> StudyStatus:
+        noise = server.runtime.settings.extraction.noise
+        return server.studies.start(kind.name, options, options.arguments(noise, server.library.path), noise)
 
 
-@router.post("/cwlf", responses=STARTED)
-def cwlf(
-    start: Start,
-    options: Annotated[CornerOptions, Body(examples=[{"quick": True}, {"scans": 500, "noise": "settings"}])],
-) -> StudyStatus:
-    """The experiment of the paper on CWLF, in simulated rooms or from a recording. One study at a time."""
-    return start("cwlf", options)
-
-
-@router.post("/wctls", responses=STARTED)
-def wctls(
-    start: Start,
-    options: Annotated[CornerOptions, Body(examples=[{"quick": True}, {"quick": False, "seed": 7}])],
-) -> StudyStatus:
-    """The experiment of the paper on WCTLS, in simulated rooms or from a recording. One study at a time."""
-    return start("wctls", options)
-
-
-@router.post("/clustering-ekf", responses=STARTED)
-def clustering_ekf(
-    start: Start, options: Annotated[DriveOptions, Body(examples=[{"quick": True, "runs": 1}])]
-) -> StudyStatus:
-    """The experiment of the paper on clusters and the Kalman filter, simulated. One study at a time."""
-    return start("clustering-ekf", options)
+for kind in KINDS.values():
+    _add_start(kind)
 
 
 @router.delete("/running", status_code=204, responses=documented(404))
-def cancel(studies: CurrentStudies) -> None:
+def cancel(server: Server) -> None:
     """End the study that runs; nothing of it stays."""
-    studies.cancel()
+    server.studies.cancel()
 
 
 @router.get("/reports/{name}", response_class=FileResponse, responses=HTML | documented(404))
-def report(studies: CurrentStudies, name: Name) -> FileResponse:
+def report(server: Server, name: Name) -> FileResponse:
     """A report: a page that needs nothing else. No script runs in it."""
     headers = {"Content-Security-Policy": POLICY}
-    return FileResponse(studies.reports.path(name), media_type="text/html; charset=utf-8", headers=headers)
+    return FileResponse(
+        server.studies.reports.path(name), media_type="text/html; charset=utf-8", headers=headers
+    )
 
 
 @router.delete("/reports/{name}", status_code=204, responses=documented(404))
-def delete(studies: CurrentStudies, name: Name) -> None:
+def delete(server: Server, name: Name) -> None:
     """Delete a report."""
-    studies.reports.delete(name)
+    server.studies.reports.delete(name)

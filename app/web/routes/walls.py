@@ -19,11 +19,11 @@ from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
 from ...jobs.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
+from ..openapi import MEDIA_TYPES, formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from ..wall_json import WallJson, wall_rows
-from .dependencies import CurrentLandmarks, CurrentRuntime
-from .examples import MEDIA_TYPES, ok
+from .dependencies import Server
 from .grid import running_walls
 from .landmarks import USUAL, Limit, Metres, Region
 
@@ -33,12 +33,6 @@ router = APIRouter(tags=["localization"], responses=documented(404, 422))
 
 NO_SESSION = "No map is kept yet: wait for further scans, or give the session of one that is kept."
 
-WALL = {
-    "id": 0, "alpha": 0.0021, "r": 3.1007, "covariance": [[1.2e-06, 3.1e-07], [3.1e-07, 8.4e-06]],
-    "start": [3.1049, -1.9012], "end": [3.0965, 1.9866], "length": 3.8878, "length_variance": 2.1e-05,
-    "ended": [True, False], "in_corner": [True, False],
-    "first_seen": 1795255000.1, "last_seen": 1795255031.4, "count": 41,
-}  # fmt: skip
 CSV = "id,alpha_rad,r_m,x1_m,y1_m,x2_m,y2_m,length_m,..."
 
 
@@ -87,13 +81,12 @@ async def _wanted(
 
 
 def _asked(
-    runtime: CurrentRuntime,
-    landmarks: CurrentLandmarks,
+    server: Server,
     session: Annotated[
         int | None, Query(description="of a map that is kept; if not given of the one that SLAM makes now")
     ] = None,
 ) -> WallTable:
-    return running_walls(runtime) if session is None else landmarks.walls(session)
+    return running_walls(server.runtime) if session is None else server.landmarks.walls(session)
 
 
 Asked = Annotated[WallTable, Depends(_asked)]
@@ -103,7 +96,8 @@ Which = Annotated[Callable[[WallTable], Mask], Depends(_wanted)]
 @router.get(
     "/walls",
     response_model=WallsJson,
-    responses=ok({"walls": [WALL]}, "The walls", csv=CSV, geojson={"type": "FeatureCollection"}),
+    response_description="The walls",
+    responses=formats(csv=CSV, geojson={"type": "FeatureCollection"}),
 )
 def walls(
     asked: Asked,
@@ -127,7 +121,7 @@ def walls(
 @router.get(
     "/walls/nearest",
     response_model=NearestWallsJson,
-    responses=ok({"walls": [WALL], "distances": [0.412]}, "The nearest first"),
+    response_description="The nearest first",
 )
 def nearest_walls(
     asked: Asked,
@@ -145,11 +139,11 @@ def nearest_walls(
 @router.get(
     "/walls/{id}/history",
     response_model=WallHistoryJson,
-    responses=ok({"session": 3, "wall": WALL, "history": [WALL], "next": None}, "The wall") | documented(503),
+    response_description="The wall",
+    responses=documented(503),
 )
 def history(
-    runtime: CurrentRuntime,
-    landmarks: CurrentLandmarks,
+    server: Server,
     id: int,
     after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
     limit: Limit = USUAL,
@@ -162,11 +156,11 @@ def history(
     So also of one that became part of another. It begins when three keyframes have seen the wall; of a wall of the
     running map it is empty until then.
     """
-    kept = landmarks.session if session is None else session
+    kept = server.landmarks.session if session is None else session
     try:
-        return encode(_kept_history(landmarks, kept, id, after, limit))
+        return encode(_kept_history(server.landmarks, kept, id, after, limit))
     except (NotFoundError, UnknownWallError):
-        wall = _running_wall(runtime, id) if session is None else None
+        wall = _running_wall(server.runtime, id) if session is None else None
         if wall is None:
             raise
         return encode({"session": kept, "wall": wall, "history": [], "next": None})
