@@ -42,7 +42,14 @@ EXAMPLE = {
     "recordings": [RECORDING],
     "undo_within": UNDO_WITHIN,
 }
-FACTS = {"format": "ROS 1 bag", "topics": ["/scan"], "scans": 812, "duration": 81.2, "problem": None}
+FACTS = {
+    "format": "ROS 2 bag",
+    "sensor": "RPLIDAR S1",
+    "topics": ["/scan"],
+    "scans": 812,
+    "duration": 81.2,
+    "problem": None,
+}
 
 
 @router.get("", responses=ok(EXAMPLE, "What can be played"))
@@ -58,7 +65,7 @@ def read(library: CurrentLibrary) -> RecordingsJson:
 
 @router.get("/{name}/facts", responses=ok(FACTS, "What it holds") | documented(404, 422))
 def facts(library: CurrentLibrary, name: Name) -> RecordingFacts:
-    """Format, lidars, scans and duration (s): the first time, all of the recording is read for that."""
+    """Format, sensor, lidars, scans and duration (s): the first time, all of the recording is read for that."""
     return library.facts(name)
 
 
