@@ -194,6 +194,7 @@
 
   /** Show all nodes but these, in this browser only. */
   function hide(names) {
+    if (`${names}` === `${hidden}`) return;
     hidden = names;
     window.__viserMutable?.requestRender();
   }
@@ -237,10 +238,12 @@
     }
   }
 
-  /** The map is seen from above only: viser would draw its other side, too. */
+  /** The map is seen from above only: viser would draw its other side, too, and set up both anew for every picture. */
   function drawMapOnce() {
     window.__viserMutable.nodeRefFromName["/occupancy"]?.traverse(({ material }) => {
-      if (material) material.forceSinglePass = true;
+      if (!material?.map || material.forceSinglePass) return;
+      material.forceSinglePass = true;
+      material.needsUpdate = true; // from here on it has a map
     });
   }
 
