@@ -1,6 +1,7 @@
 """The inspector: what it says of a wall is what REST says."""
 
 import re
+from collections.abc import Callable
 from math import cos, degrees, hypot, sin, sqrt
 from typing import Any
 
@@ -121,3 +122,30 @@ def test_wall_and_corner_lead_to_each_other_and_escape_ends_both(compared: Visit
     expect(card.get_by_role("heading", name="Wall")).to_be_visible()
     compared.page.keyboard.press("Escape")
     expect(card).to_be_hidden()
+
+
+def test_card_and_legend_never_lie_on_each_other(visit: Callable[..., Visitor]) -> None:
+    visitor = visit(1400, 900).open()
+    visitor.server.patch("settings", {"view": {"compare": True}})
+    visitor.await_frame(visitor.server.pause())
+    page, sides = visitor.page, set()
+    card, legend = page.get_by_role("complementary", name="Inspector"), page.locator("#legend")
+
+    def are_apart() -> bool:
+        one, other = card.bounding_box(), legend.bounding_box()
+        is_beside = one["x"] + one["width"] <= other["x"] or other["x"] + other["width"] <= one["x"]
+        return is_beside or one["y"] + one["height"] <= other["y"] or other["y"] + other["height"] <= one["y"]
+
+    for row in page.locator("#corner-table tbody button").all():
+        row.click()
+        expect(card).to_contain_text(row.inner_text())
+        wait_until(are_apart, "card and legend lie apart", 5)
+        sides.add(card.bounding_box()["x"] < legend.bounding_box()["width"])
+        if legend.get_attribute("open") is None:
+            legend.get_by_text("Legend").click()
+            wait_until(are_apart, "the legend has the place", 5)
+            card.get_by_role("button", name="Fold the inspector").click()
+            wait_until(are_apart, "the card has the place", 5)
+    assert sides == {True, False}
+    card.get_by_role("button", name="Close the inspector").click()
+    expect(legend.get_by_text("Sensor")).to_be_visible()

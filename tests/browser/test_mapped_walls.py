@@ -231,8 +231,12 @@ def test_with_the_map_its_walls_and_their_card_go(look: Callable[..., Visitor], 
     visitor.tolerated.append("404")  # the wall whose history it asks for may be gone by then
     visitor.page.get_by_role("button", name=f"W{wall['id']}", exact=True).click()
     found = card(visitor, wall)
+    maps = visitor.page.get_by_role("region", name="Maps").get_by_role("listitem")
+    expect(maps.filter(has_text="being built")).to_have_count(1)
     mapped.patch("settings", {"navigation": {"mode": "off"}})
     expect(found).to_be_hidden()
+    expect(maps.filter(has_text="being built")).to_have_count(0)
+    expect(maps).not_to_have_count(0)
     wait_until(lambda: visitor.knows("mapped") == {"walls": [], "corners": []}, "no wall is known")
     assert visitor.knows("mappedWall") is None, (
         "the next map counts from zero: its wall of that number is another"
