@@ -99,10 +99,31 @@ def test_wall_shows_its_repeatability(compared: Visitor) -> None:
         mine["walls"], key=lambda one: hypot(one["mean"][0] - wall["alpha"], one["mean"][1] - wall["r"])
     )
     dots = compared.server.get(f"repeatability/walls/{sighted['id']}")["deviations"][frame["fitter"]]
-    expect(card.locator("circle.dot")).to_have_count(len(dots))
+    expect_held(card, frame["fitter"], sighted, len(dots))
+
+
+@pytest.mark.long
+def test_corner_shows_its_repeatability_by_every_method(compared: Visitor) -> None:
+    server, frame = compared.server, compared.server.get("frame")
+    methods = server.get("repeatability")["methods"]
+    main = next(method for method in methods if method["name"] == frame["fitter"])
+    corner = next(c for c in frame["corners"] if len(c["by_method"]) == len(methods))
+    x, y = (corner["by_method"][main["name"]][axis] for axis in "xy")
+    id_ = min(main["corners"], key=lambda one: hypot(one["mean"][0] - x, one["mean"][1] - y))["id"]
+    compared.page.get_by_role("button", name=f"C{corner['id']}", exact=True).click()
+    card = compared.page.get_by_role("complementary", name="Inspector")
+    dots = server.get(f"repeatability/corners/{id_}")["deviations"][main["name"]]
+    for method in methods:
+        (sighted,) = (one for one in method["corners"] if one["id"] == id_)
+        expect_held(card, method["name"], sighted, len(dots))
+
+
+def expect_held(card: Locator, method: str, sighted: dict[str, Any], dots: int) -> None:
+    """The card shows the sightings of a thing, and how many of them a method's ellipses hold."""
+    expect(card.locator("circle.dot")).to_have_count(dots)
     for kind, claim in sighted["claims"].items():
         inside = round(claim["judgement"]["coverage_95"]["value"] * sighted["count"])
-        cell = card.locator(f"td[data-method={frame['fitter']}][data-kind={kind}]")
+        cell = card.locator(f"td[data-method={method}][data-kind={kind}]")
         expect(cell).to_have_text(f"{inside} of {sighted['count']}")
         expect(cell).to_have_attribute(
             "title", re.compile(f"{kind}: {inside} of {sighted['count']} inside, ")
