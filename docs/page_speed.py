@@ -118,6 +118,8 @@ def _measure(url: str, browsers: list[Browser], process: psutil.Process) -> None
         _begin(session)
     for session, ages in zip(sessions, _watched(pages), strict=True):
         _tell(session, len(ages))
+    for page in (*pages, empty):
+        page.context.close()
 
 
 def _empty_page(browser: Browser, url: str) -> Page:
