@@ -194,24 +194,18 @@
 
   /** Show all nodes but these, in this browser only. */
   function hide(names) {
+    if (`${names}` === `${hidden}`) return;
     hidden = names;
-    if (window.__viserMutable) applyHidden();
+    window.__viserMutable?.requestRender();
   }
 
-  /** viser draws only when it is asked to; a node holds its children, the root all of them. */
+  /** A node holds its children, the root all of them. */
   function applyHidden() {
-    const { nodeRefFromName, requestRender } = window.__viserMutable;
-    const unseen = new Set();
+    const { nodeRefFromName } = window.__viserMutable;
+    nodeRefFromName[""]?.traverse(({ layers }) => layers.set(0)); // of three.js: the first is drawn
     for (const [name, node] of Object.entries(nodeRefFromName)) {
-      if (hidden.some((one) => name.startsWith(one))) node?.traverse((part) => unseen.add(part));
+      if (hidden.some((one) => name.startsWith(one))) node?.traverse(({ layers }) => layers.disableAll());
     }
-    let isStale = false;
-    nodeRefFromName[""]?.traverse((part) => {
-      const mask = unseen.has(part) ? 0 : 1; // of three.js's layers: none, or the first
-      isStale ||= part.layers.mask !== mask;
-      part.layers.mask = mask;
-    });
-    if (isStale) requestRender();
   }
 
   /** The homography from the floor (x, y, 1) to pixels of the window, row by row; null until there is a view. */
@@ -235,14 +229,22 @@
 
   /** Points have a size of the screen; viser knows only metres. */
   function sizePoints() {
-    const scale = POINT_PX * devicePixelRatio * controls().distance;
+    const { nodeRefFromName, scene } = window.__viserMutable;
+    const scale = POINT_PX * drawing(scene).viewport.dpr * controls().distance;
     for (const name of POINTS) {
-      window.__viserMutable.nodeRefFromName[name]?.traverse(({ isPoints, material }) => {
-        if (!isPoints || material.uniforms.scale.value === scale) return;
-        material.uniforms.scale.value = scale;
-        window.__viserMutable.requestRender();
+      nodeRefFromName[name]?.traverse(({ isPoints, material }) => {
+        if (isPoints) material.uniforms.scale.value = scale;
       });
     }
+  }
+
+  /** The map is seen from above only: viser would draw its other side, too, and set up both anew for every picture. */
+  function drawMapOnce() {
+    window.__viserMutable.nodeRefFromName["/occupancy"]?.traverse(({ material }) => {
+      if (!material?.map || material.forceSinglePass) return;
+      material.forceSinglePass = true;
+      material.needsUpdate = true; // from here on it has a map
+    });
   }
 
   let ticked = () => {};
@@ -250,12 +252,31 @@
   /** Calls `run(viser's state)` before every picture. */
   const onTick = (run) => (ticked = run);
 
-  /** viser makes objects anew when what they hold changes its size, and sizes points itself: ours are kept all the time. */
+  /** viser makes objects anew when what they hold changes its size, and sizes points itself: ours go before every picture. */
   function keep() {
     ticked(window.__viserMutable);
     applyHidden();
     sizePoints();
-    requestAnimationFrame(keep);
+    drawMapOnce();
+  }
+
+  /** The state of what draws a scene (react-three-fiber's store). */
+  const drawing = (scene) => scene.__r3f.root.getState();
+
+  /**
+   * One picture for each change. viser draws on for a quarter of a second, so always at ten scans a second, and the first
+   * picture lacks the change; and it takes a few pictures a second for a slow machine, on which it draws more coarsely.
+   */
+  function drawOnDemand() {
+    const viser = window.__viserMutable;
+    const { invalidate, set, setDpr } = drawing(viser.scene);
+    viser.requestRender = () => {
+      viser.drainMessageQueue?.();
+      invalidate();
+    };
+    set({ setDpr: () => setDpr([1, 2]) }); // as fine as the screen is, within these
+    viser.scene.onBeforeRender = keep;
+    viser.backgroundMaterial.visible = false; // of a picture that is never there, as large as the view
   }
 
   async function start() {
@@ -263,7 +284,7 @@
     applyMode();
     controls().addEventListener("update", () => looked());
     window.addEventListener("resize", () => looked());
-    keep();
+    drawOnDemand();
   }
 
   const style = document.createElement("style");

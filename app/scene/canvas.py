@@ -40,9 +40,9 @@ class Canvas:
                 "/occupancy", np.zeros((1, 1, 4), np.uint8), 1.0, 1.0, cast_shadow=False, receive_shadow=False
             ),
             "walls": self._add_strokes("/walls", 2),
-            "true": self._add_strokes("/trails/true", 2),
-            "reckoned": self._add_strokes("/trails/reckoned", 1.5),
-            "trail": self._add_strokes("/trails/estimated", 2),
+            "true": self._add_strokes("/trails/true", 1.5),
+            "reckoned": self._add_strokes("/trails/reckoned", 1),
+            "trail": self._add_strokes("/trails/estimated", 1.5),
             "associations": self._add_strokes("/associations", 1.5),
             "gaps": self._add_strokes("/body/gaps", 1),
             "segments": self._add_strokes("/body/segments", 2),

@@ -11,12 +11,12 @@ from .colours import Rgbs, rgb
 
 PALETTE = {
     "dark": {
-        "points": "#9fb0c8", "rejected": "#ff5c5c", "cluster": "#e58fd0", "trail": "#e8c468", "reckoned": "#8a6fb0",
+        "points": "#9fb0c8", "rejected": "#ff5c5c", "cluster": "#e58fd0", "trail": "#e8c468", "reckoned": "#5d5070",
         "true": "#4f8fd0", "association": "#c8d2e0", "ambiguous": "#ff9d5c", "free": "#232b36", "occupied": "#b3c1d3",
         "wall": "#6fd3e8", "landmark": "#5ad1a4", "tentative": "#6b7686",
     },
     "light": {
-        "points": "#56657a", "rejected": "#c92a2a", "cluster": "#a83a90", "trail": "#a86f00", "reckoned": "#7b4fb0",
+        "points": "#56657a", "rejected": "#c92a2a", "cluster": "#a83a90", "trail": "#a86f00", "reckoned": "#b9a8d0",
         "true": "#1f6fb8", "association": "#46536a", "ambiguous": "#c45a00", "free": "#e4eaf1", "occupied": "#27303b",
         "wall": "#0a7f97", "landmark": "#0b7a55", "tentative": "#9aa5b4",
     },

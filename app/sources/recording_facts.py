@@ -17,12 +17,13 @@ _READING = Lock()  # one at a time: reading takes a core
 
 @dataclass(frozen=True, slots=True)
 class RecordingFacts:
-    """Format, lidars by their topics where it names them, how many scans, and the s from the first to the last.
+    """Format, sensor and lidars (by topic) where it names them, how many scans, and the s from the first to the last.
 
     scans and duration are None, and `problem` says why, if that is not known.
     """
 
     format: str | None
+    sensor: str | None
     topics: tuple[str, ...]
     scans: int | None
     duration: float | None
@@ -42,9 +43,11 @@ def _read(path: Path, size: int, modified: int) -> RecordingFacts:
     try:
         found.extend(Isolated(path.name, RecordingError, _facts, path))
     except TopicError as error:
-        return RecordingFacts(None, tuple(error.topics), None, None, "It holds several lidars: choose one.")
+        return RecordingFacts(
+            None, None, tuple(error.topics), None, None, "It holds several lidars: choose one."
+        )
     except LidarError as error:
-        begun = found[-1] if found else RecordingFacts(None, (), None, None)
+        begun = found[-1] if found else RecordingFacts(None, None, (), None, None)
         return replace(begun, scans=None, duration=None, problem=str(error))
     return found[-1]
 
@@ -58,5 +61,5 @@ def _facts(path: Path) -> Iterator[RecordingFacts]:
         duration += step if step > 0 or not scans else PERIOD
         scans, before = scans + 1, scan.stamp
         if scans % 500 == 0:
-            yield RecordingFacts(recording.name, recording.topics, scans, duration)
-    yield RecordingFacts(recording.name, recording.topics, scans, duration)
+            yield RecordingFacts(recording.name, recording.sensor, recording.topics, scans, duration)
+    yield RecordingFacts(recording.name, recording.sensor, recording.topics, scans, duration)

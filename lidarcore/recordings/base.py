@@ -30,6 +30,7 @@ class Recording(ABC):
     name            of the format
     path            of the file or directory
     topics          the lidars in the file, where the format names them; topic: the one that is read
+    sensor          model of the lidar, where the file or its format says so, else None
     T_base_sensor   (3,) x m, y m, yaw rad of the sensor in the robot's base frame; None if the file has none
     mask            sectors of the robot's own body, left out of every scan; those kept in the file, else ()
     stations        numbers of the scans from which on the sensor stood at another place, as far as the file says so
@@ -45,6 +46,7 @@ class Recording(ABC):
     name: ClassVar[str]
     signature: ClassVar[re.Pattern[bytes]]
     """Found in the beginning of every file of the format, and of no other."""
+    sensor: str | None = None
 
     def __init__(self, path: Path, topic: str | None = None) -> None:
         self.path = path

@@ -26,6 +26,8 @@ class Revolution(NamedTuple):
 class RplidarRecording(Recording):
     """Samples of an RPLIDAR, revolution by revolution."""
 
+    sensor = "RPLIDAR"
+
     @abstractmethod
     def _revolutions(self) -> Iterator[Revolution]:
         """Yield the samples between two starts of a revolution, in the order of the file."""

@@ -13,7 +13,7 @@ from lidarcore.scan import Scan
 class RplidarCapture(Recording):
     """A capture as the driver or the recorder wrote it, decoded as if it came now."""
 
-    name = "RPLIDAR capture"
+    name, sensor = "RPLIDAR capture", "RPLIDAR"
     signature = re.compile(rb"\A" + re.escape(SIGNATURE))
 
     def _open(self, topic: str | None) -> None:

@@ -23,7 +23,7 @@ class RplidarHex(Recording):
     What came from the sensor and what went to it cannot be told apart, and there are no times.
     """
 
-    name = "RPLIDAR hex dump"
+    name, sensor = "RPLIDAR hex dump", "RPLIDAR"
     signature = re.compile(rb"\A\s*(?:(?:0[xX][0-9a-fA-F]{2}[\s,]+){16}|[aA]5[ \t]+[0-9a-fA-F]{2}\s)")
 
     def _open(self, topic: str | None) -> None:

@@ -26,7 +26,7 @@ class SlambotLog(LaserLog):
     T_odom_sensor is dead reckoning from the encoders. Over a jump, as when they are reset, the robot stands.
     """
 
-    name = "SLAMbot log"
+    name, sensor = "SLAMbot log", "RPLIDAR A1"
     signature = re.compile(rb"\A-?\d+ -?\d+ \d+( \d+){100}")
 
     def _open(self, topic: str | None) -> None:

@@ -12,7 +12,7 @@ from lidarcore.closing import Closing
 from lidarcore.features import Features
 from lidarcore.files.growing_file import GrowingFile
 from lidarcore.recordings.base import NOMINAL_PERIOD
-from lidarcore.recordings.ros.mcap import MAGIC, MASK, METADATA
+from lidarcore.recordings.ros.mcap import MAGIC, MASK, METADATA, SENSOR
 from lidarcore.recordings.ros.messages import typestore
 from lidarcore.scan import Scan
 
@@ -36,7 +36,7 @@ class RecordingWriter(Closing):
     /scan/beams  lidarcore_msgs/Beams (see beams.py): exact bearings, times and gaps, for `open_recording`
     /odom, /tf   nav_msgs/Odometry and its transform, if scans have odometry
     /features    visualization_msgs/MarkerArray: walls, corners and their ellipses, if features are given
-    The mask of the robot's body is kept as metadata, and the ranges as they were measured.
+    The sensor's model and the mask of the robot's body are kept as metadata, and the ranges as they were measured.
 
     Times of recording follow the stamps, and go on by 0.1 s where the stamps do not grow. Whole scans are written
     together, twice a second: after `kill -9` or on a full disk the file is whole up to there, without an index.
@@ -54,7 +54,7 @@ class RecordingWriter(Closing):
         self._file = GrowingFile(Path(path), END)
         self._mcap = Writer(self._file, chunk_size=1 << 30)  # type: ignore[arg-type]  # chunks end with a flush only
         self._mcap.start("ros2", f"lidarcore {version('lidarcore')}")
-        self._mcap.add_metadata(METADATA, {"sensor": sensor})
+        self._mcap.add_metadata(METADATA, {SENSOR: sensor})
         self._ellipse_scale = ellipse_scale
         self._channels: dict[str, int] = {}
         self._mask: tuple[Sector, ...] = ()

@@ -34,8 +34,8 @@ export function inspectedCorner(frame) {
 }
 
 const factsOf = ({ x, y, sigma_x, sigma_y, angle, area }) => [
-  ["x", `${metres(x)} ± ${millimetres(sigma_x)}\u2009mm`],
-  ["y", `${metres(y)} ± ${millimetres(sigma_y)}\u2009mm`],
+  ["x", `${metres(x)}\u2009m ± ${millimetres(sigma_x)}\u2009mm`],
+  ["y", `${metres(y)}\u2009m ± ${millimetres(sigma_y)}\u2009mm`],
   ["1σ area", `${squareMillimetres(area)}\u2009mm²`],
   ["Angle", `${degrees(angle)}°`],
 ];

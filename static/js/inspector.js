@@ -27,12 +27,13 @@ const history = el("div");
 const start = el("button", { type: "button", title: "Keep the sensor still meanwhile" }, "Compare with the next scans");
 const sightings = el("div", {}, drawing, caption, counts, start);
 
-const fold = iconButton("fold", "Fold the inspector", () => {
-  const isFolded = $("inspector").classList.toggle("folded");
-  fold.setAttribute("aria-expanded", String(!isFolded));
-});
+const fold = iconButton("fold", "Fold the inspector", () => setFolded(!$("inspector").classList.contains("folded")));
 fold.id = "fold";
-fold.setAttribute("aria-expanded", "true");
+
+function setFolded(isFolded) {
+  $("inspector").classList.toggle("folded", isFolded);
+  fold.setAttribute("aria-expanded", String(!isFolded));
+}
 
 /** The card is made once: what a finger presses is still there when it is lifted. */
 export function mountInspector() {
@@ -41,6 +42,9 @@ export function mountInspector() {
   start.addEventListener("click", () => changeSetting("repeatability.running", true));
   const close = iconButton("close", "Close the inspector", () => select({ corner: null }));
   $("inspector").append(el("h2", {}, title, fold, close), facts, rows, ways, sightings, history);
+  setFolded(false);
+  new ResizeObserver(foldLegend).observe($("inspector"));
+  $("legend").addEventListener("toggle", () => $("legend").open && isOnLegend() && setFolded(true));
   for (const key of SHOWN) on([key], refresh);
 }
 
@@ -58,6 +62,22 @@ function standAside(thing) {
   if (!thing) return;
   const at = lookNow().toScreen(thing.at);
   $("inspector").classList.toggle("left", Boolean(at) && at[0] > $("stage").clientWidth / 2);
+  foldLegend();
+}
+
+let isLegendFolded = false; // by the card
+
+/** What was opened last has the place: the card folds the legend until it closes, and the legend folds the card. */
+function foldLegend() {
+  const isGone = $("inspector").hidden;
+  if (isGone ? !isLegendFolded : !$("legend").open || !isOnLegend()) return;
+  isLegendFolded = !isGone;
+  $("legend").open = isGone;
+}
+
+function isOnLegend() {
+  const [card, legend] = ["inspector", "legend"].map((id) => $(id).getBoundingClientRect());
+  return card.left < legend.right && legend.left < card.right && card.top < legend.bottom && legend.top < card.bottom;
 }
 
 function draw(thing) {

@@ -46,15 +46,15 @@ export function mountMaps() {
       clearButton,
     ),
   );
-  on(["panel", "localization"], refresh);
+  on(["panel", "localization", "mapped"], refresh);
   on(["maps", "localization", "landmarks"], draw);
-  on(["localization", "settings"], offer);
+  on(["localization", "settings", "maps"], offer);
 }
 
-let listed = ""; // when the maps were asked for: with which panel open and which map in use
+let listed = ""; // when the maps were asked for: with which panel open, which map in use, and how many walls in one that grows
 
-function refresh(panel, { session }) {
-  const wanted = `${panel} ${session}`;
+function refresh(panel, { session, mode }, { walls }) {
+  const wanted = [panel, session, mode, walls.length].join(" ");
   if (panel === "map" && listed !== wanted) list();
   listed = wanted;
 }
@@ -64,18 +64,20 @@ async function list() {
   if (maps) set("maps", maps);
 }
 
-function draw({ sessions, store }, { session }, landmarks) {
-  const live = { session, landmarks: landmarks.size };
+function draw({ sessions, store }, { session, mode }, landmarks) {
+  const built = mode === "slam" ? sessions.find(({ ended }) => ended === null)?.id : undefined;
+  const live = { session, landmarks: landmarks.size, built };
   remake($("map-list"), [sessions, store.error, live], () => rows(sessions, store, live));
 }
 
 /** What is saved and cleared is the map that is built or localized in. */
-function offer(localization, { navigation }) {
+function offer(localization, { navigation }, { sessions }) {
   const { session } = localization;
   const ofGrid = isOfScans(navigation, localization);
   const isBuilding = ofGrid && navigation.mode === "slam";
-  const links = () => (session === null ? [nothingToSave()] : saveLinks(session, ofGrid ? OF_GRID : FORMATS));
-  remake($("map-save"), [session, isBuilding, ofGrid], () => (isBuilding ? buildingLinks() : links()));
+  const isNone = !sessions.length;
+  const links = () => (session === null ? [nothingToSave(isNone)] : saveLinks(session, ofGrid ? OF_GRID : FORMATS));
+  remake($("map-save"), [session, isBuilding, ofGrid, isNone], () => (isBuilding ? buildingLinks() : links()));
   clearButton.disabled = session === null;
 }
 
@@ -88,7 +90,8 @@ function rows(sessions, { error }, live) {
 }
 
 function row({ id, source, mode, started, landmarks, walls, grid }, live) {
-  const isUsed = id === live.session;
+  const isBuilt = id === live.built;
+  const isUsed = isBuilt || id === live.session;
   const count = isUsed ? Math.max(landmarks, live.landmarks) : landmarks;
   const holds = walls ? `${wholeNumber(walls)} walls` : grid ? "a grid" : `${wholeNumber(count)} landmarks`;
   const button = el(
@@ -104,16 +107,17 @@ function row({ id, source, mode, started, landmarks, walls, grid }, live) {
     el("small", {}, holds),
   );
   if (isUsed) button.setAttribute("aria-current", "true");
-  const about = [source, mode === "import" ? "loaded" : null, moment(started)].filter(Boolean).join(", ");
+  const about = [isBuilt && "being built", source, mode === "import" && "loaded", moment(started)].filter(Boolean).join(", ");
   const lost = grid && !walls ? holds : `${holds} and their history`;
   const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, lost));
   return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
 }
 
-const nothingToSave = () => el("p", { class: "muted" }, "There is no map to save or clear.");
+const nothingToSave = (isNone) =>
+  el("p", { class: "muted" }, isNone ? "There is no map to save or clear." : "Click a map to localize in it: then it can be saved or cleared.");
 
 const buildingLinks = () => [
-  el("p", { class: "muted" }, "Save the map of the building as"),
+  el("p", { class: "muted" }, "Save the map as it is now:"),
   ...Object.entries(BUILDING).map(([format, name]) =>
     saveLink(`map/grid?format=${format}`, `map.${format}`, name, "the map of the building"),
   ),

@@ -25,7 +25,7 @@ const MOTION_HINT =
 
 const ABOUT = {
   off: "The view is drawn from the sensor. SLAM builds a map while the sensor moves; Localize finds the sensor in a map that there is.",
-  slam: "Builds a map and finds the sensor in it at the same time.",
+  slam: "Builds a map, which is kept in Maps below, and finds the sensor in it at the same time.",
   localize: "Finds the sensor in an existing map.",
 };
 

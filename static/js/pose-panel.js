@@ -10,6 +10,7 @@ import { degrees, fixed, metres, microseconds, millimetres, UNKNOWN, wholeNumber
 
 const STATES = {
   starting: "Starting, too little seen so far",
+  searching: "Not found in the map yet",
   tracking: "Tracking",
   coasting: "Coasting, not confirmed by what is in view",
   lost: "Lost, looking for a known place",
@@ -167,7 +168,10 @@ function draw(frame, { navigation }, source, connection, { problem }) {
 /** A known map says nothing of the pose until something of it was recognised. */
 const isPlaced = (now) => now && !(now.mode === "localize" && now.state === "starting");
 
-const stateText = (now, problem) => (now ? STATES[now.state] : (problem ?? "Waiting for a scan"));
+function stateText(now, problem) {
+  if (!now) return problem ?? "Waiting for a scan";
+  return STATES[now.mode === "localize" && now.state === "starting" ? "searching" : now.state];
+}
 
 /** Lines of [label, text, hint] beside the estimate. */
 function comparison(now) {

@@ -81,10 +81,11 @@ function extentOf(recording) {
   return parts.filter(Boolean).join(", ");
 }
 
-/** What took it, as far as that is known. */
+/** What took it, as far as the file says so. */
 function aboutOf(recording) {
   const facts = get("recordingFacts")[keyOf(recording)];
-  const parts = [recording.builtin && "demo", facts?.format, facts?.topics.join(", "), facts?.problem];
+  const sensor = facts?.format && (facts.sensor ?? "sensor not named");
+  const parts = [recording.builtin && "demo", sensor, facts?.format, facts?.topics.join(", "), facts?.problem];
   return parts.filter(Boolean).join(" · ");
 }
 

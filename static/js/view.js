@@ -103,7 +103,10 @@ const MAPPED = [
   { layer: "associations", sign: "association", label: NAMES.associations },
 ];
 
-const SIZES = { grown: "too small to see: drawn larger", shrunk: "larger than the view: drawn smaller" };
+const SIZES = {
+  grown: "too small to see: drawn larger. Zoom in for true sizes",
+  shrunk: "larger than the view: drawn smaller",
+};
 
 /** The legend names what is drawn, and says by how much the ellipses are enlarged and what the colours of points mean. */
 function drawLegend(frame, settings, methods, sizes, localization) {

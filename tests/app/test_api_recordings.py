@@ -223,6 +223,8 @@ def test_a_recording_is_downloaded_as_it_is_and_says_what_it_holds(server: Serve
     found = server.get("/recordings/room.npz/facts")
     assert found.items() >= wanted.items()
     assert found["format"]
+    assert found["sensor"] is None  # .npz files do not say
+    assert server.get("/recordings/emulated-s1.mcap/facts")["sensor"] == "RPLIDAR S1"
     (server.folder / "bad.bag").write_bytes(b"nothing")
     found = server.get("/recordings/bad.bag/facts")
     assert (found["scans"], found["duration"]) == (None, None)

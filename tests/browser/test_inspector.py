@@ -1,6 +1,7 @@
 """The inspector: what it says of a wall is what REST says."""
 
 import re
+from collections.abc import Callable
 from math import cos, degrees, hypot, sin, sqrt
 from typing import Any
 
@@ -98,10 +99,31 @@ def test_wall_shows_its_repeatability(compared: Visitor) -> None:
         mine["walls"], key=lambda one: hypot(one["mean"][0] - wall["alpha"], one["mean"][1] - wall["r"])
     )
     dots = compared.server.get(f"repeatability/walls/{sighted['id']}")["deviations"][frame["fitter"]]
-    expect(card.locator("circle.dot")).to_have_count(len(dots))
+    expect_held(card, frame["fitter"], sighted, len(dots))
+
+
+@pytest.mark.long
+def test_corner_shows_its_repeatability_by_every_method(compared: Visitor) -> None:
+    server, frame = compared.server, compared.server.get("frame")
+    methods = server.get("repeatability")["methods"]
+    main = next(method for method in methods if method["name"] == frame["fitter"])
+    corner = next(c for c in frame["corners"] if len(c["by_method"]) == len(methods))
+    x, y = (corner["by_method"][main["name"]][axis] for axis in "xy")
+    id_ = min(main["corners"], key=lambda one: hypot(one["mean"][0] - x, one["mean"][1] - y))["id"]
+    compared.page.get_by_role("button", name=f"C{corner['id']}", exact=True).click()
+    card = compared.page.get_by_role("complementary", name="Inspector")
+    dots = server.get(f"repeatability/corners/{id_}")["deviations"][main["name"]]
+    for method in methods:
+        (sighted,) = (one for one in method["corners"] if one["id"] == id_)
+        expect_held(card, method["name"], sighted, len(dots))
+
+
+def expect_held(card: Locator, method: str, sighted: dict[str, Any], dots: int) -> None:
+    """The card shows the sightings of a thing, and how many of them a method's ellipses hold."""
+    expect(card.locator("circle.dot")).to_have_count(dots)
     for kind, claim in sighted["claims"].items():
         inside = round(claim["judgement"]["coverage_95"]["value"] * sighted["count"])
-        cell = card.locator(f"td[data-method={frame['fitter']}][data-kind={kind}]")
+        cell = card.locator(f"td[data-method={method}][data-kind={kind}]")
         expect(cell).to_have_text(f"{inside} of {sighted['count']}")
         expect(cell).to_have_attribute(
             "title", re.compile(f"{kind}: {inside} of {sighted['count']} inside, ")
@@ -121,3 +143,30 @@ def test_wall_and_corner_lead_to_each_other_and_escape_ends_both(compared: Visit
     expect(card.get_by_role("heading", name="Wall")).to_be_visible()
     compared.page.keyboard.press("Escape")
     expect(card).to_be_hidden()
+
+
+def test_card_and_legend_never_lie_on_each_other(visit: Callable[..., Visitor]) -> None:
+    visitor = visit(1400, 900).open()
+    visitor.server.patch("settings", {"view": {"compare": True}})
+    visitor.await_frame(visitor.server.pause())
+    page, sides = visitor.page, set()
+    card, legend = page.get_by_role("complementary", name="Inspector"), page.locator("#legend")
+
+    def are_apart() -> bool:
+        one, other = card.bounding_box(), legend.bounding_box()
+        is_beside = one["x"] + one["width"] <= other["x"] or other["x"] + other["width"] <= one["x"]
+        return is_beside or one["y"] + one["height"] <= other["y"] or other["y"] + other["height"] <= one["y"]
+
+    for row in page.locator("#corner-table tbody button").all():
+        row.click()
+        expect(card).to_contain_text(row.inner_text())
+        wait_until(are_apart, "card and legend lie apart", 5)
+        sides.add(card.bounding_box()["x"] < legend.bounding_box()["width"])
+        if legend.get_attribute("open") is None:
+            legend.get_by_text("Legend").click()
+            wait_until(are_apart, "the legend has the place", 5)
+            card.get_by_role("button", name="Fold the inspector").click()
+            wait_until(are_apart, "the card has the place", 5)
+    assert sides == {True, False}
+    card.get_by_role("button", name="Close the inspector").click()
+    expect(legend.get_by_text("Sensor")).to_be_visible()

@@ -124,6 +124,8 @@ def test_demo_that_comes_along_plays_and_cannot_be_deleted(live: Watched) -> Non
     live.wait_for(
         lambda frame: frame["source"]["index"] > 3 and frame["corners"], "it plays, and has corners"
     )
+    about = live.page.get_by_role("listitem").filter(has_text=demo)
+    expect(about).to_contain_text(re.compile(r"12.s, 1\.5.MB.*RPLIDAR S1"))
     live.press("Emulator")
     expect(live.page.get_by_role("button", name=f"Delete {demo}")).to_have_count(0)
 

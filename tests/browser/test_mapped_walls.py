@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import Server, Visitor
+from lidarcore_app.scene.colours import rgb
+from lidarcore_app.scene.palette import PALETTE
 from playwright.sync_api import Browser, Locator, expect
 from waiting import wait_until
 
@@ -34,10 +36,11 @@ def look(browser: Browser, mapped: Server) -> Iterator[Callable[..., Visitor]]:
     """Opens the page at its map, knowing the walls that the server knows."""
     visitors: list[Visitor] = []
 
-    def open_map(width: int = 1000, height: int = 640, **options: Any) -> Visitor:
+    def open_map(width: int = 1000, height: int = 640, has_scene: bool = False, **options: Any) -> Visitor:
         context = browser.new_context(viewport={"width": width, "height": height}, **options)
         context.add_init_script("localStorage.setItem('welcomed', 'yes')")
-        context.route("**/viser/**", lambda route: route.fulfill(body="", content_type="text/html"))
+        if not has_scene:
+            context.route("**/viser/**", lambda route: route.fulfill(body="", content_type="text/html"))
         visitor = Visitor(context.new_page(), mapped).open()
         visitors.append(visitor)
         visitor.page.get_by_role("tab", name="Map").click()
@@ -110,6 +113,16 @@ def in_sight(server: Server) -> Wall:
     near = server.get(f"walls/nearest?x={x}&y={y}&direction={np.arctan2(dy, dx)}&tolerance=0.05")
     assert near["distances"][0] < 0.1
     return near["walls"][0]
+
+
+@pytest.mark.long
+@pytest.mark.scene
+def test_who_comes_when_the_map_is_made_sees_where_one_can_go(look: Callable[..., Visitor]) -> None:
+    visitor = look(has_scene=True, color_scheme="dark")
+    free = rgb(PALETTE["dark"]["free"])
+    wait_until(
+        lambda: (np.abs(visitor.picture() - free).max(axis=2) <= 6).mean() > 0.02, "the ground is there"
+    )
 
 
 def test_pointing_at_a_wall_of_the_map_says_what_it_is(look: Callable[..., Visitor], mapped: Server) -> None:
@@ -218,8 +231,12 @@ def test_with_the_map_its_walls_and_their_card_go(look: Callable[..., Visitor], 
     visitor.tolerated.append("404")  # the wall whose history it asks for may be gone by then
     visitor.page.get_by_role("button", name=f"W{wall['id']}", exact=True).click()
     found = card(visitor, wall)
+    maps = visitor.page.get_by_role("region", name="Maps").get_by_role("listitem")
+    expect(maps.filter(has_text="being built")).to_have_count(1)
     mapped.patch("settings", {"navigation": {"mode": "off"}})
     expect(found).to_be_hidden()
+    expect(maps.filter(has_text="being built")).to_have_count(0)
+    expect(maps).not_to_have_count(0)
     wait_until(lambda: visitor.knows("mapped") == {"walls": [], "corners": []}, "no wall is known")
     assert visitor.knows("mappedWall") is None, (
         "the next map counts from zero: its wall of that number is another"

@@ -1,5 +1,6 @@
 """The page lives: it loads from this machine alone, draws, and follows the frames."""
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -7,6 +8,13 @@ import pytest
 from browsing import GOLF, Visitor, drawn
 from playwright.sync_api import expect
 from waiting import wait_until
+
+COUNT_PICTURES = """() => {
+  const { scene } = document.querySelector("#scene").contentWindow.__viserMutable;
+  const before = scene.onBeforeRender;
+  window.pictures = 0;
+  scene.onBeforeRender = () => (window.pictures++, before());
+}"""
 
 
 @pytest.mark.scene
@@ -36,6 +44,21 @@ def test_frames_advance_in_figures_and_picture(visitor: Visitor) -> None:
     first, picture = int(visitor.readout("frame")), visitor.picture()
     wait_until(lambda: int(visitor.readout("frame")) > first + 5, "later frames are shown")
     wait_until(lambda: (visitor.picture() != picture).any(), "the picture changes")
+
+
+@pytest.mark.long
+@pytest.mark.scene
+def test_the_scene_is_drawn_once_for_each_scan(visitor: Visitor) -> None:
+    visitor.server.pause()
+    before = visitor.still_picture(seconds=1.5)
+    visitor.page.evaluate(COUNT_PICTURES)
+    begin = time.monotonic()
+    for _ in range(8):
+        visitor.await_frame(visitor.server.step(1))
+        before = visitor.still_picture(differs_from=before)
+    count = visitor.page.evaluate("window.pictures")
+    seldom = time.monotonic() - begin  # viser looks once a second whether something was forgotten
+    assert 8 <= count <= 2 * 8 + seldom  # the camera may move once more
 
 
 @pytest.mark.long

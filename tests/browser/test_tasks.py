@@ -1,7 +1,8 @@
 """Tasks from the start page by mouse and keyboard, with nothing but the names that are to be seen."""
 
 import re
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from zipfile import ZipFile
 
@@ -11,6 +12,15 @@ from playwright.sync_api import Locator, Page, expect
 from waiting import wait_until
 
 from lidarcore.rplidar.emulation.options import EmulatorOptions
+
+MINUTE = 60.0  # s
+
+
+@pytest.fixture(autouse=True)
+def within_a_minute() -> Iterator[None]:
+    begin = time.monotonic()
+    yield
+    assert time.monotonic() - begin < MINUTE
 
 
 @pytest.fixture

@@ -195,6 +195,7 @@ def test_the_file_is_indexed_and_says_what_it_holds(drive):
         assert len(found) == 10
         (metadata,) = reader.iter_metadata()
         assert metadata.metadata == {"sensor": "a sensor"}
+    assert open_recording(path).sensor == "a sensor"
 
 
 def test_checksums_are_right(drive):

@@ -47,7 +47,7 @@ def read(server: Server) -> RecordingsJson:
 
 @router.get("/{name}/facts", response_description="What it holds", responses=documented(404, 422))
 def facts(server: Server, name: Name) -> RecordingFacts:
-    """Format, lidars, scans and duration (s): the first time, all of the recording is read for that."""
+    """Format, sensor, lidars, scans and duration (s): the first time, all of the recording is read for that."""
     return server.library.facts(name)
 
 

@@ -15,7 +15,8 @@ from lidarcore.recordings.ros.messages import WANTED, Message, check_topics, pla
 
 MAGIC = b"\x89MCAP0\r\n"
 SCHEMA, CHANNEL, MESSAGE, CHUNK, METADATA_RECORD, DATA_END = 3, 4, 5, 6, 12, 15
-METADATA, MASK = "lidarcore", "mask"  # name and key of what this library keeps beside the messages
+METADATA = "lidarcore"  # name of what this library keeps beside the messages
+MASK, SENSOR = "mask", "sensor"  # its keys
 MOST_METADATA = 1 << 14  # bytes of a record; larger ones are of others
 
 

@@ -13,7 +13,7 @@ from lidarcore.body_mask import from_text
 from lidarcore.errors import MaskError, RecordingError
 from lidarcore.files.foreign_database import bound, stores_its_columns
 from lidarcore.files.streams import DAMAGE, MEBIBYTE, ZSTD, Unpacker, is_packed, open_stream, read_head
-from lidarcore.recordings.ros.mcap import MASK, McapReader
+from lidarcore.recordings.ros.mcap import MASK, SENSOR, McapReader
 from lidarcore.recordings.ros.messages import MOST_TOPICS, WANTED, Message, check_topics, plain_type
 from lidarcore.recordings.ros.recording import RosRecording
 
@@ -34,6 +34,7 @@ class Rosbag2(RosRecording):
     def _open(self, topic: str | None) -> None:
         self._metadata: dict[str, str] = {}
         super()._open(topic)
+        self.sensor = self._metadata.get(SENSOR)
         try:
             self.mask = from_text(self._metadata.get(MASK, "[]"))
         except MaskError as error:

@@ -18,7 +18,7 @@ export class Fading {
   }
 
   /** Looks, before a picture is drawn, whether there is a new scan. */
-  tick({ nodeRefFromName, requestRender }) {
+  tick({ nodeRefFromName }) {
     const points = pointsOf(nodeRefFromName[NODE]);
     if (!points) return;
     const kept = this.count() && this.count() + 1; // the scan that is shown is the first of them
@@ -29,7 +29,6 @@ export class Fading {
     if (isNew) this.#ghosts.unshift(ghostOf(points));
     for (const ghost of this.#ghosts.splice(kept)) remove(ghost);
     this.#ghosts.forEach(({ material }, age) => (material.blendAlpha = STRONGEST * (1 - age / kept)));
-    requestRender();
   }
 }
 

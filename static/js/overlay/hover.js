@@ -32,8 +32,8 @@ function cornerSaid({ id, measured }) {
   const { x, y, sigma_x, sigma_y, angle } = inSensor;
   return [
     `Corner C${id}`,
-    `x ${metres(x)} ± ${millimetres(sigma_x)} mm`,
-    `y ${metres(y)} ± ${millimetres(sigma_y)} mm`,
+    `x ${metres(x)} m ± ${millimetres(sigma_x)} mm`,
+    `y ${metres(y)} m ± ${millimetres(sigma_y)} mm`,
     `${degrees(angle)}° between its walls`,
     others.length ? `by ${method} and ${others.length} other methods` : `by ${method}`,
   ];

@@ -99,7 +99,8 @@ export function drawOver(pen, look) {
   tell(drawMarks(pen, look, world, { view, mask: sensor.mask ?? [], selection, hovered, colours }));
   if (get("place")) drawPlace(pen, look, get("place"), colours);
   drawMeasure(pen, look, colours);
-  showHover([...hovered, pointed && speckAt(get("around"), view.layers, look, pointed)].filter(Boolean), pointed);
+  const speck = pointed && speckAt(get("around"), view.layers, look, pointed);
+  showHover(isMeasuring() ? [] : [...hovered, speck].filter(Boolean), pointed); // it would hide what is measured
   showScale(look);
 }
 
