@@ -19,23 +19,26 @@ export async function refreshRecordings() {
   const listing = await attempt(() => request("GET", "recordings"), "The recordings could not be listed");
   if (!listing) return;
   set("recordings", listing);
-  learn(listing.recordings);
+  learn();
 }
 
 let learning = false;
 
 /** Asks what each recording holds, one after the other: the server reads them for that. */
-async function learn(recordings) {
+async function learn() {
   if (learning) return;
   learning = true;
-  for (const recording of recordings) {
-    const key = keyOf(recording);
-    if (get("panel") !== "sources" || key in get("recordingFacts") || isGrowing(recording)) continue;
+  for (let recording = unknown(); recording; recording = unknown()) {
     const facts = await request("GET", `${pathOf(recording.name)}/facts`).catch(() => null);
-    set("recordingFacts", { ...get("recordingFacts"), [key]: facts });
+    set("recordingFacts", { ...get("recordingFacts"), [keyOf(recording)]: facts });
   }
   learning = false;
 }
+
+/** The next of those listed now that nobody has asked about, while someone looks. */
+const unknown = () =>
+  get("panel") === "sources" &&
+  get("recordings").recordings.find((recording) => !(keyOf(recording) in get("recordingFacts")) && !isGrowing(recording));
 
 const pathOf = (name) => `recordings/${encodeURIComponent(name)}`;
 const keyOf = ({ name, size, modified }) => [name, size, modified].join("/");

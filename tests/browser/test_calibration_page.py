@@ -12,7 +12,7 @@ from browsing import Server, Visitor
 from playwright.sync_api import Locator, expect
 from waiting import wait_until
 
-from lidarcore import SensorNoise
+from lidarcore import SENSORS, SensorNoise
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.simulation import SimulatedSensor
 from lidarcore.simulation.world import World
@@ -116,7 +116,9 @@ def test_noise_of_a_sensor_is_found_used_and_kept_as_a_profile(
     assert server.get("profiles")["profiles"] == []
     assert noise(server) == wanted
     page.get_by_role("button", name="RPLIDAR A1 or A2").click()
-    wait_until(lambda: noise(server)["unevenness_length"] == 0.12, "the usual noise of an A1 is used")
+    wait_until(
+        lambda: noise(server) == asdict(SENSORS["rplidar_a1_a2"].noise), "the usual noise of an A1 is used"
+    )
     expect(profile(visitor, "RPLIDAR A1 or A2")).to_contain_text("14 places in three recordings")
 
 
