@@ -172,7 +172,7 @@ def test_stations_are_judged_with_the_noise_that_their_first_half_tells() -> Non
                 assert station.noise.sigma_range == pytest.approx(0.01, rel=0.15)
                 assert holds(held, 0.95)
                 assert held.half_width < 0.025
-                # sigma_range is known to 5 %; straight walls may be uneven by what was overlooked, and so may their ends.
+                # sigma_range is known to 5 %; walls may be uneven by what was overlooked, and so may their ends.
                 assert 0.8 < figures.area_ratio(0).value < 1.3
             else:
                 assert held.high < 0.8
