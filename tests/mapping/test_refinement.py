@@ -43,7 +43,7 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
     def residuals(x):
         placed = np.array([act(x[3 * k : 3 * k + 3], m) for k, m in zip(keyframes, means, strict=True)])
         r = -(placed - middle)[:, 1] - x[9] - x[10] * t0
-        return np.append(np.sqrt(weights) * r, x[10] / 0.1)
+        return np.append(np.sqrt(weights) * r, x[10] / 1.0)
 
     t0 = (world - middle)[:, 0]  # along the normal (0, -1), t is x
     x0 = np.append(poses.ravel(), [0.0, 0.0])
