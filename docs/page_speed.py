@@ -132,7 +132,10 @@ def _empty_page(browser: Browser, url: str) -> Page:
 
 
 def _draws(process: psutil.Process) -> bool:
-    return "--type=gpu-process" in process.cmdline()
+    try:
+        return "--type=gpu-process" in process.cmdline()
+    except psutil.Error:  # it has ended
+        return False
 
 
 def _seconds(processes: list[psutil.Process]) -> float:
