@@ -3,6 +3,8 @@
 import os
 import random
 import select
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -17,6 +19,7 @@ from waiting import wait_until
 
 from lidarcore.errors import NoAnswerError, NoDeviceError, ProtectionStopError, UnpluggedError
 from lidarcore.rplidar import Driver
+from lidarcore.rplidar.connection.port import holders
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.rplidar.protocol import Answer, Command, Descriptor, DeviceInfo, RequestReader
 
@@ -218,6 +221,22 @@ def test_unplugging_at_any_moment_of_connecting_is_an_error_and_no_hang(sensor: 
         sensor.command("replug")
     with Driver(sensor.port) as driver:
         next(iter(driver))
+
+
+LINK = """import os, sys, time
+end = time.monotonic() + 0.5
+while time.monotonic() < end:
+    os.symlink("/dev/null", sys.argv[1])
+    os.unlink(sys.argv[1])
+"""
+
+
+def test_who_holds_a_port_can_be_asked_while_it_comes_and_goes(tmp_path: Path) -> None:
+    """Asked some ten thousand times; in a quarter of them the link goes between being found and being read."""
+    link = tmp_path / "ttyS1"
+    with subprocess.Popen([sys.executable, "-c", LINK, str(link)]) as process:
+        while process.poll() is None:
+            assert holders(str(link)) == []
 
 
 @pytest.mark.long

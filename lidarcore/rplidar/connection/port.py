@@ -143,7 +143,10 @@ def path_of(port: str) -> str:
 
 def holders(path: str) -> list[str]:
     """Other programs that have the port open, as "name (pid 123)", as far as the system lets this user see."""
-    device = os.path.realpath(path)
+    try:
+        device = os.path.realpath(path)
+    except OSError:  # it was a link, and is gone
+        return []
     if not (device.startswith(TERMINALS) and os.path.exists(device)):
         return []
     return [_program(process) for process in glob.glob("/proc/[0-9]*") if _holds(process, device)]
