@@ -11,8 +11,9 @@ from lidarcore.mapping.graph.refinement import Refined
 from lidarcore.mapping.loops.back import BackEnd
 from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.keyframes import Keyframes
+from lidarcore.mapping.matching.distortion import half_time, pose_shift
 from lidarcore.mapping.matching.front import FrontEnd
-from lidarcore.mapping.matching.motion_smoothing import ScanMotion, half_time, smoothed
+from lidarcore.mapping.matching.motion_smoothing import ScanMotion, smoothed
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
@@ -156,5 +157,5 @@ class Mapper:
 
 def _motion_of(tracked: Tracked) -> ScanMotion:
     variances = np.diagonal(tracked.tie.covariance - tracked.sweep)
-    half = half_time(tracked.scan)
-    return ScanMotion(half, tracked.velocity, np.zeros(3), variances, tracked.sweep, tracked.on)
+    half, shift = half_time(tracked.scan), pose_shift(tracked.scan, tracked.patches)
+    return ScanMotion(half, tracked.velocity, np.zeros(3), variances, tracked.sweep, shift, tracked.on)

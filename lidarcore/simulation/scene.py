@@ -12,6 +12,8 @@ from lidarcore.simulation.people import LEG, Person
 from lidarcore.simulation.posts import Posts, distances_to_circles
 from lidarcore.simulation.world import World
 
+_ONE_LINE = 0.01  # m: two beams whose walls' lines pass the sensor at distances this alike meet the same wall
+
 
 @dataclass(frozen=True, slots=True)
 class Scene:
@@ -51,7 +53,8 @@ class Scene:
 class Optics:
     """What a sensor makes of true ranges.
 
-    mixed      share of the beams at a step in range that meet both sides: they report something in between
+    mixed      share of the beams at a step in range from one surface to another that meet both sides: they report
+               something in between
     dropouts   share of all beams that are lost for no reason in particular
     grazing    sine of the angle to the wall below which nothing comes back
     limits     m, nearest and farthest range that is reported
@@ -67,17 +70,22 @@ class Optics:
     def observe(self, ranges: Array, sines: Array, rng: np.random.Generator) -> tuple[Array, Array]:
         """Reported ranges (N,) m, NaN for no return, and quality (N,), 0 to 63, of neighbouring beams."""
         sigmas = np.sqrt(self.noise.range_variances(ranges))
-        seen = self._mix(ranges, rng) + sigmas * rng.normal(size=len(ranges))
+        seen = self._mix(ranges, sines, rng) + sigmas * rng.normal(size=len(ranges))
         low, high = self.limits
         lost = (rng.random(len(ranges)) < self.dropouts) | (sines < self.grazing)
         seen = np.where(lost | ~((seen >= low) & (seen <= high)), np.nan, seen)
         quality = np.clip(np.rint((60 - 1.5 * seen) * np.sqrt(sines)), 5, 63)
         return seen, np.where(np.isnan(seen), 0.0, quality)
 
-    def _mix(self, ranges: Array, rng: np.random.Generator) -> Array:
-        """Where range jumps from one beam to the next, some lie anywhere between both sides."""
-        step = np.diff(ranges, append=ranges[-1:])
-        mixed = (np.abs(step) > self.step) & (rng.random(len(ranges)) < self.mixed)
+    def _mix(self, ranges: Array, sines: Array, rng: np.random.Generator) -> Array:
+        """Where range jumps from one surface to the next, some beams lie anywhere between both sides.
+
+        Along a wall that is seen at a slant ranges grow in steps, too, but its line stays as far away.
+        """
+        lines = ranges * sines
+        step, apart = (np.diff(values, append=values[-1:]) for values in (ranges, lines))
+        edges = (np.abs(step) > self.step) & (np.abs(apart) > _ONE_LINE)
+        mixed = edges & (rng.random(len(ranges)) < self.mixed)
         return ranges + np.where(mixed, step * rng.random(len(ranges)), 0.0)
 
 

@@ -157,8 +157,10 @@ def _measured(groups: Groups, cells: int, keyframes: int) -> tuple[float, float]
     for _ in range(10):
         expected = scale * noise + shared
         inner = squares < _LARGEST * expected
-        rows = np.stack([noise, np.ones(len(noise))], -1)[inner] / expected[inner, None]
-        (scale, shared), _ = nnls(rows, squares[inner] / expected[inner])
+        # Each square as it is certain, and as much as it says about the poses: those count whose claims matter.
+        weights = expected[inner] ** -1.5
+        rows = np.stack([noise, np.ones(len(noise))], -1)[inner] * weights[:, None]
+        (scale, shared), _ = nnls(rows, squares[inner] * weights)
         scale = max(scale, 0.01)
     return float(scale), float(np.sqrt(shared))
 

@@ -1,7 +1,7 @@
 """How the sensor moved while it took each scan, smoothed over the scans around it once they are there.
 
-When a scan comes, all that is known of its speed is the motion since the one before, which is a revolution old. A cubic
-through where the scans around it were taken says what the speed was in its middle, and how it changed.
+When a scan comes, all that is known of its speed is the motion since the one before, which is a revolution old. The
+scans around it say what the speed was in its middle, and how it changed.
 """
 
 from typing import NamedTuple
@@ -9,19 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import compose, relative, rotation
-from lidarcore.mapping.matching.sweep import PAUSE, is_swept
-from lidarcore.scan import Scan
+from lidarcore.geometry import compose, inverse, left_of, relative, rotate
+from lidarcore.mapping.matching.jerk import Drive, Window, estimated
+from lidarcore.mapping.matching.sweep import PAUSE
 
-# Scans that tell the speed: half a revolution after a scan is in their middle.
-_AROUND = np.arange(-2, 4)
-_SPEED = np.array([10.0, 10.0, 10.0])  # m/s, m/s, rad/s: nothing is known of it before
-_ACCELERATION = np.array([0.5, 0.5, 1.0])  # m/s², m/s², rad/s²: usual ones, standard deviation
-_STEADY = 0.5  # s, for which an acceleration usually lasts
-# Where an acceleration jumps, a cubic shows a speed that is off by this share of what its third derivative makes of the
-# time between two scans, squared (root mean square over where it jumps).
-_JUMP = 0.25
-_ROUNDS = 20
+_AROUND = np.arange(-3, 4)
+"""Scans that tell the speed."""
+_ROUNDS = 3  # a wrong speed shifts scans, from which it is told: a tenth of it comes back
 
 
 class ScanMotion(NamedTuple):
@@ -32,6 +26,7 @@ class ScanMotion(NamedTuple):
     acceleration  (3,) m/s², m/s², rad/s², likewise
     variances     (3,) of the pose that it was placed at
     sweep         (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
+    shift         (2, 3, 3) by which it is misplaced for each unit of both that was taken out too much
     on            whether what it saw says where
     """
 
@@ -40,77 +35,51 @@ class ScanMotion(NamedTuple):
     acceleration: Array
     variances: Array
     sweep: Array
+    shift: Array
     on: bool
-
-
-def half_time(scan: Scan) -> float:
-    """Mean time (s) of a scan's beams after its stamp; 0 if it is not known."""
-    return float(np.mean(scan.beam_times)) if scan.beam_times is not None and is_swept(scan) else 0.0
 
 
 def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Array, list[ScanMotion]]:
     """Poses (T, 3) of scans and their motions, with the speeds that the poses around show where they show any.
 
-    A scan from which e too much of its velocity was taken out was placed e times the mean time of its beams behind:
-    the velocities that poses show, and the poses, depend on each other.
+    Where the sensor was in the mean time of a scan's beams, the scan says whatever motion was taken out of it, but
+    for its shift.
     """
     h = np.array([one.half for one in motions])[:, None]
     on = np.array([one.on for one in motions])
     removed = np.stack([[*one.velocity, *one.acceleration] for one in motions]).reshape(-1, 2, 3)
+    shift = np.array([one.shift for one in motions])
     at = np.arange(len(stamps))[:, None] + _AROUND
     there = np.clip(at, 0, len(stamps) - 1)
-    since = stamps[there] - stamps[:, None]
+    since = stamps[there] - stamps[:, None] + h[there, 0] - h
     told = (at == there) & on[there] & (np.abs(since) < PAUSE)
     known = on & (h[:, 0] > 0) & (told.sum(axis=1) > 1)
     variances = np.array([one.variances for one in motions])
     variances[0] = variances[min(1, len(motions) - 1)]  # the first scan is the map: others share its errors
-    weights, unsure = _estimator(since - h, np.where(told[..., None], variances[there], np.inf))
-    now, shown, jerks = poses, removed, np.zeros_like(poses)
+    laid = compose(poses, _covered(removed, h))
+    means, shown = laid, removed
     for _ in range(_ROUNDS):
-        rates = np.einsum("tdik,tkd->tid", weights, relative(now[:, None], now[there]))
-        shown, jerks = _seen_from_within(rates[:, :2], h), rates[:, 2]
-        shown = np.where(known[:, None, None], shown, removed)
-        v, a = np.moveaxis(removed - shown, 1, 0)
-        now = compose(poses, h * v - h**2 / 3 * a)
-    lever = np.concatenate([h, -(h**2) / 3], -1)
-    spread = np.einsum("ti,tdij,tj->td", lever, unsure, lever)
-    spread += (_JUMP * h * jerks * _apart(stamps)[:, None] ** 2) ** 2
+        places = relative(means[:, None], means[there])
+        window = Window.of(told, since, h, places, variances[there])
+        rates, spread = estimated(window, Drive.of(window))
+        rates[:, 1, :2] -= rates[:, 0, 2:] * left_of(rates[:, 0, :2])  # as the sensor has them, which turns
+        shown = np.where(known[:, None, None], rates, removed)
+        means = compose(laid, np.einsum("tijk,tik->tj", shift, shown - removed))
+    now = np.where(known[:, None], compose(means, inverse(_covered(shown, h))), poses)
+    # Of a pose, for each unit by which a speed and an acceleration are taken out too much.
+    lever = shift - np.stack([h, -(h**2) / 3], 1)[..., None] * np.eye(3)
+    sweeps = np.einsum("tijd,tdik,tkld->tjl", lever, spread, lever)
     after = [
-        one._replace(velocity=shown[k, 0], acceleration=shown[k, 1], sweep=np.diag(spread[k]))
-        if known[k]
-        else one
+        one._replace(velocity=shown[k, 0], acceleration=shown[k, 1], sweep=sweeps[k]) if known[k] else one
         for k, one in enumerate(motions)
     ]
     return now, after
 
 
-def _estimator(t: Array, variances: Array) -> tuple[Array, Array]:
-    """Weights (T, 3, 3, K) that make velocities and two derivatives out of poses (T, K, 3); covariances (T, 3, 2, 2).
+def _covered(rates: Array, h: Array) -> Array:
+    """Poses (T, 3), seen from where scans began, where their beams were taken on average.
 
-    t (T, K) s are times from the one that is asked about; variances (T, K, 3) are of the poses, inf for none. The
-    motion is a cubic: how it differs from one, as accelerations do not last, counts as noise that grows with time.
+    rates (T, 2, 3) are velocities and accelerations in their mean time h (T, 1) s.
     """
-    basis = np.stack([np.ones_like(t), t, t**2 / 2, t**3 / 6], -1)
-    beyond = _ACCELERATION / _STEADY**2 * (t**4 / 24)[..., None]
-    information = 1 / np.maximum(variances + beyond**2, 1e-12)
-    usual = np.stack([np.full(3, 1e3), _SPEED, _ACCELERATION, _ACCELERATION / _STEADY], -1) ** -2.0
-    H = np.einsum("tki,tkd,tkj->tdij", basis, information, basis) + usual[:, :, None] * np.eye(4)
-    C = np.linalg.inv(H)
-    weights = np.einsum("tdij,tkj,tkd->tdik", C, basis, information)
-    return weights[:, :, 1:], C[:, :, 1:3, 1:3]
-
-
-def _apart(stamps: Array) -> Array:
-    """Time (T,) s between each scan and the nearer one of its neighbours: a pause says nothing of how speeds change."""
-    gaps = np.concatenate([[np.inf], np.diff(stamps), [np.inf]])
-    nearer: Array = np.minimum(gaps[1:], gaps[:-1])
-    return np.where(np.isfinite(nearer), nearer, 0.0)
-
-
-def _seen_from_within(rates: Array, h: Array) -> Array:
-    """Velocities and accelerations (T, 2, 3), seen from where a scan began, as the sensor has them h (T, 1) s later."""
-    v, a = np.moveaxis(rates, 1, 0).copy()
-    R = rotation(v[:, 2] * h[:, 0])
-    v[:, :2], a[:, :2] = (np.einsum("tji,tj->ti", R, of[:, :2]) for of in (v, a))
-    a[:, :2] -= v[:, 2:] * np.stack([-v[:, 1], v[:, 0]], -1)
-    return np.stack([v, a], 1)
+    moved = h * rates[:, 0] - h**2 / 3 * rates[:, 1]
+    return np.concatenate([rotate(moved[:, 2] / 2, moved[:, :2]), moved[:, 2:]], -1)

@@ -1,0 +1,100 @@
+"""Speeds and accelerations told by places around a time, where nobody knows how jerkily a sensor is driven.
+
+Accelerations wander: the jerk is white noise, of a density that the places themselves tell
+[Rasmussen & Williams, Gaussian Processes, 2006, eq. 2.23 and 5.8].
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import logsumexp, softmax
+
+from lidarcore.arrays import Array, Bools
+
+_USUAL = np.array([[1.0, 10.0, 1.0], [1.0, 10.0, 1.0], [1.0, 10.0, 2.0]])
+"""Standard deviations of place, speed and acceleration in m and rad, before any place says anything."""
+_JERKS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
+"""What may change an acceleration within a second, from the steadiest drive to the jerkiest: m/s², m/s², rad/s²."""
+_NOISES = 2.0 ** np.arange(3, -8, -1)
+"""Times the variances of places, which their noise may really have."""
+_ENOUGH = 300  # times that tell the noise
+_ROUNDS = 20  # of expectation maximisation
+
+
+class Window(NamedTuple):
+    """K places around each of T times, each dimension on its own.
+
+    basis   (T, 1, K, 3) of place, speed and acceleration at the time
+    noise   (T, 3, K, K) covariance of the places
+    wander  (T, 1, K, K) covariance of where white jerk of density 1 has led
+    places  (T, 3, K, 1) m, m, rad
+    """
+
+    basis: Array
+    noise: Array
+    wander: Array
+    places: Array
+
+    @classmethod
+    def of(cls, told: Bools, t: Array, h: Array, places: Array, variances: Array) -> "Window":
+        """Places (T, K, 3) around t (T, K) s, each the mean over h (T, 1) s before and after; some may not be told."""
+        basis = np.stack([np.ones_like(t), t, t**2 / 2 + h**2 / 6], -1) * told[..., None]
+        noise = np.swapaxes(np.where(told[..., None], variances, 1.0), 1, 2)[..., None] * np.eye(t.shape[1])
+        given = np.swapaxes(np.where(told[..., None], places, 0.0), 1, 2)[..., None]
+        return cls(basis[:, None], noise, _wander(np.where(told, t, 0.0))[:, None], given)
+
+
+class Drive(NamedTuple):
+    """What the places of a whole drive say of it.
+
+    noise   (3,) times the variances of the places, which is what explains them best: poses of scans on one map share
+            its errors, which are no noise from one to the next
+    shares  (J, 3) how often each density of the jerk explains them best
+    """
+
+    noise: Array
+    shares: Array
+
+    @classmethod
+    def of(cls, window: Window) -> "Drive":
+        """By some of its times, maximum likelihood."""
+        some = Window(*(column[:: -(-len(window.places) // _ENOUGH)] for column in window))
+        evidences = np.array([[_fit(some, n, jerk)[0] for jerk in _JERKS] for n in _NOISES])
+        best = np.argmax(logsumexp(evidences, axis=1).sum(axis=1), axis=0)
+        chosen = evidences[best, :, :, np.arange(3)].transpose(1, 2, 0)
+        shares = np.full((len(_JERKS), 3), 1 / len(_JERKS))
+        for _ in range(_ROUNDS):
+            shares = softmax(chosen + np.log(shares)[:, None], axis=0).mean(axis=1)
+        return cls(_NOISES[best], shares)
+
+
+def estimated(window: Window, drive: Drive) -> tuple[Array, Array]:
+    """Speeds and accelerations (T, 2, 3) with covariances (T, 3, 2, 2): each jerk counts as it explains the places."""
+    fits = [_fit(window, drive.noise, jerk) for jerk in _JERKS]
+    evidences, rates, covariances = (np.stack(column) for column in zip(*fits, strict=True))
+    shares = softmax(evidences + np.log(drive.shares)[:, None], axis=0)[..., None, None]
+    mean = (shares * rates).sum(axis=0)
+    off = rates - mean
+    return np.swapaxes(mean[..., 0], 1, 2).copy(), (shares * (covariances + off @ off.mT)).sum(axis=0)
+
+
+def _fit(window: Window, noise: Array | float, jerk: Array) -> tuple[Array, Array, Array]:
+    """Log evidence (T, 3) of `noise` (3,) times the variances and of a density (3,); speed and acceleration
+    (T, 3, 2, 1) with covariance (T, 3, 2, 2), if they are so.
+    """
+    A, y, P = window.basis, window.places, _USUAL[..., None] ** 2 * np.eye(3)
+    N = np.reshape(noise, (-1, 1, 1)) * window.noise + (jerk**2)[:, None, None] * window.wander
+    S = A @ P @ A.mT + N
+    inverse = np.linalg.inv(S)
+    evidence = -0.5 * ((y.mT @ inverse @ y)[..., 0, 0] + np.linalg.slogdet(S)[1])
+    gain = (P @ A.mT @ inverse)[..., 1:, :]
+    left = np.eye(3)[1:] - gain @ A
+    return evidence, gain @ y, left @ P @ left.mT + gain @ N @ gain.mT
+
+
+def _wander(t: Array) -> Array:
+    """Covariance (T, K, K) of where white jerk of density 1 has led by t (T, K) s, the acceleration at 0 s known."""
+    a, b = t[:, :, None], t[:, None, :]
+    m = np.where(a * b > 0, np.minimum(np.abs(a), np.abs(b)), 0.0)
+    beyond = np.abs(a - b)
+    return m**5 / 20 + beyond * m**4 / 8 + beyond**2 * m**3 / 12
