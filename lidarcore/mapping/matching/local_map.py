@@ -20,7 +20,7 @@ _TURNED = 0.25  # rad from which on two poses are not the same
 _WIDE = 0.5  # m by which a point may be off where the search is needed in any case
 _BETTER = 0.02  # share of a scan by which a pose that was searched for must be better than that of the guess
 _RIVAL = 0.85  # of the share of a scan on the map, from which on another pose is a rival
-_RIVALS = 3  # other poses that are looked at
+_RIVALS = 8  # other poses that are looked at
 
 
 class LocalMap:

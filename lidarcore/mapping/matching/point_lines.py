@@ -12,7 +12,6 @@ SLANTED = 0.0
 """Instead of a count: the returns lie far apart, along a wall that is seen at a slant."""
 _FARTHEST = 3.0  # m between two of them
 _STRAIGHT = 9.0  # squared standard deviations by which the middle one of three is off their line, at most
-_RARE = 3.0  # standard deviations: noise alone scatters points by more than that once in 700 lines
 _RELIEF = 0.01  # m by which walls are off lines of that length
 
 
@@ -47,19 +46,10 @@ def _fit_line(points: Array, i: int, first: int, count: int, noise: Array, row: 
     square = px * px + py * py
     across = (nx * px + ny * py) ** 2
     variance = noise[0] * across / square + noise[1] * (square - across)
-    scatter = max(half - root, 0.0) * count
-    if scatter > variance * _most_by_noise(count - 2):
-        variance = scatter / (count - 2)
+    variance = max(variance, max(half - root, 0.0) * count / max(count - 2, 1))
     row[MEAN], row[MEAN + 1], row[NORMAL], row[NORMAL + 1] = px, py, nx, ny
     row[VARIANCE], row[TILT] = variance, variance / max(count * (half + root), 1e-9)
     row[COUNT] = count
-
-
-@kernel
-def _most_by_noise(dof: int) -> float:
-    """Most squared standard deviations that noise alone scatters by, of a chi-square law [Wilson & Hilferty 1931]."""
-    spread = 2 / (9 * dof) if dof > 0 else 1.0
-    return dof * (1 - spread + _RARE * np.sqrt(spread)) ** 3
 
 
 @kernel
