@@ -8,6 +8,7 @@ from lidarcore.simulation import World, furnished_room
 from lidarcore.simulation.paths import ROUND, standing, wandering
 from lidarcore.simulation.people import LEG, Person
 from lidarcore.simulation.posts import distances_to_circles
+from lidarcore.simulation.rooms import rectangular_room
 from lidarcore.simulation.scene import Optics, Scene
 
 ROOM = furnished_room()
@@ -116,6 +117,16 @@ def test_beams_at_an_edge_report_something_in_between():
     assert (share[mixed] > 0).all()
     assert (share[mixed] < 1).all()
     assert share[mixed].mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_along_a_wall_at_a_slant_there_are_no_edges():
+    """Ranges grow there by more than at an edge, from one beam to the next."""
+    hall, here = rectangular_room(42, 26), np.array([9.0, -5.0, 0.3])
+    ranges, sines = Scene(hall, lambda times: np.tile(here, (len(times), 1))).cast(0 * FULL_TURN, FULL_TURN)
+    assert (np.abs(np.diff(ranges)) > 0.15).sum() > 100
+    optics = Optics(SensorNoise(1e-6, 1e-6), mixed=1.0, dropouts=0, grazing=0)
+    seen, _ = optics.observe(ranges, sines, np.random.default_rng(0))
+    assert (np.abs(seen - ranges) > 1e-4).sum() <= 4  # where two walls meet
 
 
 def test_noise_dropouts_and_limits_are_those_asked_for():

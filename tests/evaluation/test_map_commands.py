@@ -58,6 +58,8 @@ def test_a_map_is_judged_by_true_poses_and_by_relations(drive: Path, tmp_path: P
             assert 0 < float(mean) < 0.05  # poor odometry alone errs by 3 % of 10 m and more
             assert float(mean) <= float(worst) < 0.2
     assert len(re.findall("relations verified", told)) == 2
+    # The relations are those of the reference.
+    assert re.findall(r"by the reference +(\d+): mean 0\.0000 m, 0\.000", told) == 2 * [str(len(ends))]
 
 
 def test_poses_are_found_where_the_robot_came_by_before_and_none_elsewhere_is_believed(drive: Path) -> None:

@@ -57,7 +57,9 @@ def test_speeds_and_places_are_found_though_each_scan_was_laid_with_the_speed_be
 
 def test_a_pause_makes_no_scan_less_sure_than_the_end_of_a_drive_does():
     half = T[:20]
-    twice = np.concatenate([way(half), way(half)])  # how jerky a drive is, all of it tells: so it is driven again
+    twice = np.concatenate(
+        [way(half), way(half)]
+    )  # how jerky a drive is, all of it tells: so it is driven again
     _, after = smoothed(np.append(half, half + 30), twice, 2 * motions(velocities(half)))
     _, ended = smoothed(half, way(half), motions(velocities(half)))
     for one, alone in zip(after, 2 * ended, strict=True):

@@ -8,8 +8,8 @@ from scipy.stats import chi2
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.graph.adjustment import normal_equations
-from lidarcore.mapping.graph.adjustment_cells import Observations
-from lidarcore.mapping.graph.refinement import Step, refine
+from lidarcore.mapping.graph.adjustment_cells import Groups, Observations
+from lidarcore.mapping.graph.refinement import Step, _measured, refine
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.simulation import World, furnished_room
 from lidarcore.simulation.rooms import rectangular_room
@@ -101,6 +101,20 @@ def test_relative_poses_are_as_far_off_as_they_claim(world, poses):
     low, high = (chi2.ppf(p, 3 * len(nees)) / len(nees) for p in (5e-7, 1 - 5e-7))
     for column in nees.T:
         assert 0.85 * low < column.mean() < 1.15 * high
+
+
+def test_noise_is_measured_by_the_surfaces_that_tell_the_poses():
+    """A third of the groups scatters far less than it says, as where walls meet. By 3,000 others noise is known to 3 %,
+    give or take six standard deviations 16 %; counted alike, all of them would make it less than .7.
+    """
+    rng = np.random.default_rng(7)
+    claimed = np.concatenate([rng.uniform(1e-6, 1e-5, 3000), rng.uniform(3e-4, 2e-3, 1500)])
+    true = np.where(claimed < 1e-4, claimed, 0.05 * claimed)
+    left = rng.uniform(0.5, 1.0, len(claimed))
+    squares = left * true * rng.normal(size=len(claimed)) ** 2
+    scale, unevenness = _measured(Groups(squares, claimed, left, np.ones(len(claimed))), 200, 60)
+    assert 0.84 < scale < 1.16
+    assert unevenness < 1e-3
 
 
 def test_unevenness_that_patches_assume_does_not_count_twice():

@@ -89,6 +89,8 @@ def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
     if 0 < len(at_scans) < len(found):
         within = f"{1e3 * _AT_A_SCAN:g} ms of a scan"
         yield "  of these", f"{len(at_scans)} with both stamps within {within}: {_errors(at_scans)}"
+    if len(judged.of_reference):
+        yield "  by the reference", f"{len(judged.of_reference)}: {_errors(judged.of_reference)}"
 
 
 def _errors(off: "Array") -> str:

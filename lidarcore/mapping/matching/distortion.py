@@ -16,8 +16,8 @@ def half_time(scan: Scan) -> float:
 
 
 def pose_shift(scan: Scan, seen: Patches) -> Array:
-    """How far a scan is found from where it was, (2, 3, 3): for each unit of velocity, then of acceleration, that was
-    taken out of it too much. Both are those in the mean time of its beams, and so is where it was.
+    """How far (2, 3, 3), m and rad, a scan is found from where it was: for velocity and for acceleration the matrix
+    that makes it out of what was taken out too much. Both are those in the mean time of its beams, as is the place.
 
     Walls that were seen before the mean time are displaced one way, those seen after it the other. Where both tell
     the same of the pose, that cancels; walls on one side only, or nearer on one side, do not let it.

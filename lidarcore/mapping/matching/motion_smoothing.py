@@ -26,7 +26,7 @@ class ScanMotion(NamedTuple):
     acceleration  (3,) m/s², m/s², rad/s², likewise
     variances     (3,) of the pose that it was placed at
     sweep         (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
-    shift         (2, 3, 3) by which it is misplaced for each unit of both that was taken out too much
+    shift         (2, 3, 3) that make how far it is misplaced out of what of both was taken out too much
     on            whether what it saw says where
     """
 

@@ -1,0 +1,137 @@
+"""Speeds told by places, against integrals, a Kalman smoother of the same motion, and drives that are known."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.linalg import expm
+
+from lidarcore.mapping.matching.jerk import _JERKS, Drive, Window, _wander, estimated
+
+T = np.arange(-3, 4) / 10
+SIGMA = np.array([1e-3, 2e-3, 5e-4])
+
+
+def window(places, variances=SIGMA**2, h=0.0, told=None):
+    """Around the middle of seven places (N, 7, 3), a tenth of a second apart."""
+    n = len(places)
+    told = np.ones((n, 7), bool) if told is None else told
+    return Window.of(
+        told, np.tile(T, (n, 1)), np.full((n, 1), h), places, np.broadcast_to(variances, places.shape)
+    )
+
+
+def only(number):
+    """A drive all of whose jerks are of one density, and whose places are as noisy as they say."""
+    return Drive(np.ones(3), np.tile(np.where(np.arange(len(_JERKS)) == number, 1.0, 1e-300)[:, None], 3))
+
+
+def wandered(rng, n, jerk, step=1e-3):
+    """Places (n, 7) of one dimension, with speed and acceleration (n,) in their middle, of motions with white jerk."""
+    each = round(0.1 / step)
+    A, rows = np.array([[1, step, step**2 / 2], [0, 1, step], [0, 0, 1]]), []
+    Q = np.array(
+        [
+            [step**5 / 20, step**4 / 8, step**3 / 6],
+            [step**4 / 8, step**3 / 3, step**2 / 2],
+            [step**3 / 6, step**2 / 2, step],
+        ]
+    )
+    L = np.linalg.cholesky(Q + 1e-30 * np.eye(3)) * jerk
+    x = rng.normal(0, [0.1, 0.5, 0.3], (n, 3))
+    for k in range(6 * each + 1):
+        if k % each == 0:
+            rows.append(x.copy())
+        x = x @ A.T + rng.normal(size=(n, 3)) @ L.T
+    states = np.stack(rows, 1)
+    return states[:, :, 0], states[:, 3, 1], states[:, 3, 2]
+
+
+def test_how_far_white_jerk_leads_is_the_integral_of_what_each_moment_adds():
+    t = np.array([[-0.3, -0.1, 0.2, 0.35]])
+    C = _wander(t)[0]
+    for i, a in enumerate(t[0]):
+        for j, b in enumerate(t[0]):
+            shared = min(abs(a), abs(b)) if a * b > 0 else 0.0
+            true = quad(lambda u, a=a, b=b: (abs(a) - u) ** 2 * (abs(b) - u) ** 2 / 4, 0, shared)[0]
+            np.testing.assert_allclose(C[i, j], true, rtol=1e-9, atol=1e-18)
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_one_density_gives_what_a_kalman_filter_forth_and_back_gives(number):
+    jerk = _JERKS[number]
+    rng = np.random.default_rng(number)
+    places = rng.normal(0, 0.002, (1, 7, 3)) + np.stack([0.7 * T, -0.1 * T**2, 0.4 * T], -1)
+    rates, C = estimated(window(places), only(number))
+    for d in range(3):
+        m, P = fused(places[0, :, d], SIGMA[d] ** 2, jerk[d], [1, 10, (1, 1, 2)[d]])
+        np.testing.assert_allclose(rates[0, :, d], m[1:], rtol=1e-5, atol=1e-7)
+        np.testing.assert_allclose(C[0, d], P[1:, 1:], rtol=1e-4, atol=1e-9)
+
+
+def fused(y, variance, jerk, usual):
+    """State in the middle, by a filter over the places on either side that starts where nothing is known but it."""
+    information, vector = np.diag(np.array(usual, float) ** -2), np.zeros(3)
+    H = np.array([[1.0, 0, 0]])
+    for way in (1, -1):
+        # Backward in time for places, speeds and accelerations: the transition from the middle on, kept jointly.
+        F = np.array([[0, 1, 0], [0, 0, 1], [0, 0, 0]]) * way
+        steps = y[3:] if way > 0 else y[3::-1]
+        joint, mean = np.block([[np.diag([1e4, 1e4, 1e4])] * 2] * 2), np.zeros(6)  # middle, and the present
+        for k, place in enumerate(steps):
+            if k:
+                A = expm(F * 0.1)
+                Q = np.zeros((3, 3))
+                G = np.array([[0], [0], [1.0]])
+                nodes, weights = np.polynomial.legendre.leggauss(8)
+                for u, w in zip(0.05 * (nodes + 1), 0.05 * weights, strict=True):
+                    g = expm(F * u) @ G
+                    Q += w * jerk**2 * g @ g.T
+                B = np.block([[np.eye(3), np.zeros((3, 3))], [np.zeros((3, 3)), A]])
+                joint = B @ joint @ B.T
+                joint[3:, 3:] += Q
+                mean = B @ mean
+            if k or way > 0:
+                R = np.concatenate([np.zeros((1, 3)), H], 1)
+                K = joint @ R.T / (R @ joint @ R.T + variance)
+                mean, joint = mean + (K @ (place - R @ mean)).ravel(), joint - K @ R @ joint
+        W = np.linalg.inv(joint[:3, :3])
+        information, vector = information + W - 1e-4 * np.eye(3), vector + W @ mean[:3]
+    P = np.linalg.inv(information)
+    return P @ vector, P
+
+
+def test_the_claims_hold_for_motions_whose_jerkiness_nobody_told():
+    """4,000 windows: a claim too small by a tenth has means of squares beyond 1.2, 9 standard deviations away."""
+    rng = np.random.default_rng(5)
+    n = 4000
+    quiet, rough = (wandered(rng, n // 2, jerk) for jerk in (0.3, 3.0))
+    y, v, a = (np.concatenate(pair) for pair in zip(quiet, rough, strict=True))
+    places = np.zeros((n, 7, 3))
+    places[:, :, 0] = y + rng.normal(0, SIGMA[0] / 2, y.shape)  # half as noisy as it says
+    places -= places[:, 3:4]
+    places[:, :, 1:] = rng.normal(0, SIGMA[1:], (n, 7, 2))
+    order = rng.permutation(n)
+    told = window(places[order])
+    drive = Drive.of(told)
+    assert drive.noise[0] in (0.125, 0.25, 0.5)
+    assert drive.noise[1] == 1
+    assert drive.shares[np.argmin(np.abs(_JERKS[:, 0] - 3)), 0] > 0.2
+    rates, C = estimated(told, drive)
+    off = rates[:, :, 0] - np.stack([v, a], -1)[order]
+    squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(C[:, 0]), off) / 2
+    assert 0.85 < squares.mean() < 1.15
+
+
+def test_a_place_that_is_not_told_says_nothing():
+    rng = np.random.default_rng(2)
+    places = rng.normal(0, 0.002, (5, 7, 3))
+    told = np.ones((5, 7), bool)
+    told[:, [0, 5]] = False
+    other = places.copy()
+    other[:, [0, 5]] = 1e3
+    for one, two in zip(
+        estimated(window(places, told=told), only(2)),
+        estimated(window(other, told=told), only(2)),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(one, two)
