@@ -85,6 +85,7 @@ class Mapper:
         if not self._numbers:
             return
         self._smooth_motion()
+        self._back.recalibrate(self._front.wheels)
         if self._back.search_again():
             self._back.search_again()
         self._refined = self._back.refine()

@@ -65,8 +65,10 @@ class PoseGraph:
 
     def connect(
         self, i: int, j: int, relative: ArrayLike, covariance: ArrayLike, doubted: bool = False
-    ) -> None:
+    ) -> int:
         """Tie node j to node i by T_i_j (3,) with its covariance (3, 3); a doubted edge loses weight if it disagrees.
+
+        Returns the number of the edge.
 
         Raises LocalizationError if a node is unknown or the pose not finite, CovarianceError if the covariance is not
         positive definite.
@@ -81,6 +83,12 @@ class PoseGraph:
         self._informations = np.concatenate([self._informations, information[None]])
         self._doubts = np.append(self._doubts, DOUBTFUL if doubted else np.inf)
         self._recovery = self._extended(i, j, P, doubted)
+        return len(self._ends) - 1
+
+    def amend(self, edge: int, change: Array) -> None:
+        """Change (3,) the relative pose of an edge, which is known as well as before."""
+        self._relatives[edge] += change
+        self._recovery = None
 
     def optimize(self, tolerance: float = 1e-6, rounds: int = 50) -> float:
         """Move the nodes to the most likely poses.

@@ -1,9 +1,13 @@
 """The back end: keyframes become nodes of a pose graph, loops bend it."""
 
+from dataclasses import replace
+from typing import NamedTuple
+
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import compose, pose_difference, relative
+from lidarcore.geometry import compose, pose_difference, relative, squared_mahalanobis
+from lidarcore.mapping.doubt import DOUBTFUL
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Refined, Step, refine
 from lidarcore.mapping.loops.closure import LoopFinder
@@ -11,6 +15,7 @@ from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.islands import Islands, moved
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.loops.thinning import spare
+from lidarcore.mapping.matching.odometry_calibration import effects
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.sight import sight
 from lidarcore.mapping.matching.sweep import without
@@ -20,6 +25,19 @@ from lidarcore.mapping.tracked import Tracked
 _AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map
 _FOUND = np.diag([0.05, 0.05, 0.02]) ** 2  # how well it is known where an island was found
 _SETTLED = 0.01  # m and rad of the last step, after which the poses are far better than that
+
+
+class _Drive(NamedTuple):
+    """How a keyframe's edge hangs on odometry.
+
+    edge   number in the graph
+    taken  (3,) errors of odometry that were taken out
+    share  (3, 3) of the motion by odometry that is in the edge: nearly none where scans tell it
+    """
+
+    edge: int
+    taken: Array
+    share: Array
 
 
 class BackEnd:
@@ -37,6 +55,7 @@ class BackEnd:
         self.loops: list[Loop] = []
         self.keyframes: dict[int, Keyframe] = {}
         self.steps: list[Step] = []
+        self._drives: dict[int, _Drive] = {}  # by the number of the step
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
 
@@ -51,7 +70,9 @@ class BackEnd:
         node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
         self.keyframes[node] = _keyframe(tracked)
         self.steps.append(Step(tracked.node, node, *tracked.moved))
-        self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
+        edge = self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
+        if tracked.wheels is not None and not tracked.island:
+            self._drives[len(self.steps) - 1] = _Drive(edge, tracked.wheels, _share(tracked))
         if tracked.island:
             self._islands.begin(node)
         self._join(node)
@@ -76,6 +97,17 @@ class BackEnd:
         if scan is not keyframe.scan:
             seen = patches(scan, self._settings.front.match)
             self.keyframes[node] = Keyframe(scan, seen, sight(scan), sweep)
+
+    def recalibrate(self, errors: Array) -> None:
+        """Take out of all steps what odometry does wrong (3,) at each, which was known less well on the way."""
+        for number, drive in self._drives.items():
+            step = self.steps[number]
+            change = effects(step.pose) @ (errors - drive.taken)
+            self.steps[number] = replace(step, pose=step.pose + change)
+            self.graph.amend(drive.edge, drive.share @ change)
+            self._drives[number] = drive._replace(taken=errors)
+        if self._drives:
+            self.graph.optimize(_SETTLED)
 
     def refine(self) -> Refined:
         """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""
@@ -122,6 +154,15 @@ class BackEnd:
 
 def _keyframe(tracked: Tracked) -> Keyframe:
     return Keyframe(tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
+
+
+def _share(tracked: Tracked) -> Array:
+    """Derivative (3, 3) of a keyframe's tie for the motion by odometry that took part in it; 0 if wheels slipped."""
+    moved = tracked.moved
+    if squared_mahalanobis(pose_difference(tracked.tie.pose, moved.pose), moved.covariance) > DOUBTFUL:
+        return np.zeros((3, 3))
+    share: Array = (tracked.tie.covariance - tracked.sweep) @ np.linalg.inv(moved.covariance)
+    return share
 
 
 def _agrees(loop: Loop, poses: Array) -> bool:

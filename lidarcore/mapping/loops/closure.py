@@ -70,7 +70,8 @@ class LoopFinder:
     def conclude(self) -> list[Loop]:
         """Loops to believe of the last nodes, which no further ones will support: all fit, and nothing else does.
 
-        The newest scans alone are registered on each earlier pass, within all of what the graph leaves open.
+        The newest scans alone are registered on each earlier pass, wherever a search looks: by then the drive may have
+        gone farther astray than the graph knows, so that it did not expect a loop decides nothing.
         """
         way, found = self._way(), []
         for k in range(max(1, len(way) - 2 * self._settings.apart), len(way)):
@@ -79,7 +80,7 @@ class LoopFinder:
             seen = self._submap(k, range(k - 1, k + 1))
             for i, P in self._places(k):
                 if 3 * spread(P) < self._match_settings.max_shift:
-                    found += self._hypotheses(i, k, P, seen)
+                    found += self._hypotheses(i, k, P, seen, gated=False)
         consistency = Consistency(self._graph, self._gate)
         best = max((consistency.agreeing(loop, found) for loop in found), key=support, default=[])
         rivals = [loop for loop in found if not any(loop is member for member in best)]
@@ -143,23 +144,35 @@ class LoopFinder:
         there: Ints = nodes[np.array([n in self._keyframes for n in nodes.tolist()], bool)]
         return there
 
-    def _hypotheses(self, i: int, k: int, P: Array, seen: Patches) -> list[Loop]:
-        """Where node k may be, seen from around node i: the best place, and its rival if that is nearly as good."""
+    def _hypotheses(self, i: int, k: int, P: Array, seen: Patches, gated: bool = True) -> list[Loop]:
+        """Where node k may be, seen from around node i: the best place, and its rival if that is nearly as good.
+
+        Neither may be where the graph does not expect it, if `gated`.
+        """
         half = self._settings.before
         nodes = range(max(0, i - half), min(i + half + 1, k - self._settings.apart))
         match = self._match_settings
         earlier = self._submap(i, nodes)
         reference = surfels(earlier, match.patch, match.reach)
         mean = relative(self._graph.poses[i], self._graph.poses[k])
-        first = self._registered(i, k, mean, P, reference, seen, np.empty((0, 3)))
+
+        def best(besides: Array) -> Loop | None:
+            loop = self._registered(i, k, mean, P, reference, seen, besides)
+            return loop if loop is None or not gated or self._is_expected(loop, mean, P) else None
+
+        first = best(np.empty((0, 3)))
         if first is None:
             return []
         if not self._is_vague(P):
             return [first]
-        second = self._registered(i, k, mean, P, reference, seen, first.pose[None])
+        second = best(first.pose[None])
         if second is None or second.quality < _RIVAL * first.quality or self._same(first, second):
             return [first]
         return [first, second]
+
+    def _is_expected(self, loop: Loop, mean: Array, P: Array) -> bool:
+        """Whether a loop lies in the gate of where the graph has it: mean (3,) with covariance P (3, 3)."""
+        return squared(loop.pose, mean, loop.covariance + _CAUTION * P + _FLOOR) <= self._gate
 
     def _same(self, a: Loop, b: Loop) -> bool:
         """True if two poses are one, known only vaguely (along a corridor)."""
@@ -168,7 +181,7 @@ class LoopFinder:
     def _registered(
         self, i: int, k: int, mean: Array, P: Array, reference: Surfels, seen: Patches, besides: Array
     ) -> Loop | None:
-        """The best place besides others; None if it does not fit, or not what the graph expects."""
+        """The best place besides others; None if it does not fit."""
         P = _CAUTION * P + _FLOOR
         prior, match = information_of(_WIDEN * P), self._match_settings
         start = search(reference.means, seen.means, mean, np.sqrt(np.diagonal(P)), match, besides)
@@ -176,9 +189,9 @@ class LoopFinder:
         if registered.inliers < self._settings.inliers:
             return None
         conflicts = self._conflicts(i, k, registered.pose)
-        C = information_of(registered.information) + self._settings.floor
-        if conflicts > self._settings.conflicts or squared(registered.pose, mean, C + P) > self._gate:
+        if conflicts > self._settings.conflicts:
             return None
+        C = information_of(registered.information) + self._settings.floor
         return Loop(i, k, registered.pose, C, registered.inliers - conflicts)
 
     def _conflicts(self, i: int, k: int, pose: Array) -> float:

@@ -46,7 +46,9 @@ class FrontEnd:
             self._before = scan.stamp, scan.odometry
             self._begin(seen)
             given = np.zeros(3) if removed is None else removed
-            self._first = Tracked(scan.stamp, 0, _HERE, _HERE, True, scan, seen, NOTHING, given, True, False)
+            self._first = Tracked(
+                scan.stamp, 0, _HERE, _HERE, None, True, scan, seen, NOTHING, given, True, False
+            )
             return self._first
         dt, driven = self._since(scan)
         if self._first is not None and self._before[0] == self._first.stamp:
@@ -75,8 +77,9 @@ class FrontEnd:
         self._period += _SLOW * (dt - self._period)
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
         leaves = island or (not is_blind and self._leaves(tie[0], registered.inliers))
+        taken = None if wheels is None else self.wheels
         tracked = Tracked(
-            scan.stamp, self._number - 1, tie, moved, on, scan, seen, self._sweep.covariance,
+            scan.stamp, self._number - 1, tie, moved, taken, on, scan, seen, self._sweep.covariance,
             self._sweep.removed, leaves, island, self._first if leaves else None,
         )  # fmt: skip
         if leaves:
@@ -87,6 +90,11 @@ class FrontEnd:
                 self._map.clear()
             self._begin(seen, tie.pose)
         return tracked
+
+    @property
+    def wheels(self) -> Array:
+        """(3,) what odometry does wrong at every step, as far as it is known now."""
+        return self._wheels.errors
 
     def _straightened(
         self, first: Tracked, scan: Scan, removed: Array | None, driven: UncertainPose, dt: float

@@ -21,9 +21,14 @@ class OdometryCalibration:
         self._errors = np.zeros(3)
         self._information = np.diag(_USUAL**-2.0)
 
+    @property
+    def errors(self) -> Array:
+        """(3,) as far as they are known now."""
+        return self._errors.copy()
+
     def corrected(self, motion: Array) -> Array:
         """A motion (3,) m, m, rad that odometry tells, without what it does wrong as far as that is known."""
-        better: Array = motion + _effects(motion) @ self._errors
+        better: Array = motion + effects(motion) @ self._errors
         return better
 
     def learn(self, moved: UncertainPose, found: UncertainPose) -> None:
@@ -37,12 +42,12 @@ class OdometryCalibration:
         if squared_mahalanobis(off, moved.covariance) > DOUBTFUL:
             return  # wheels slip
         # Of the motion that was found: the noise of `moved` is in the difference, too, and would bias the way.
-        J, M = _effects(found.pose), np.linalg.inv(moved.covariance)
+        J, M = effects(found.pose), np.linalg.inv(moved.covariance)
         self._information += J.T @ (M - M @ found.covariance @ M) @ J
         self._errors += np.linalg.solve(self._information, J.T @ M @ off)
 
 
-def _effects(motion: Array) -> Array:
+def effects(motion: Array) -> Array:
     """(3, 3) by how much each error, were it 1, makes a motion (3,) m, m, rad too short."""
     x, y, turn = motion
     return np.array([[x, 0, 0], [y, 0, 0], [0, np.hypot(x, y), turn]])
