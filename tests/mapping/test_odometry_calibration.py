@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 from chance import SURE
-from mapping_scenes import NOISE, SETTINGS, WHEELS, sick_scan
+from mapping_scenes import NOISE, SETTINGS, WHEELS, full_scan, sick_scan
 
 from lidarcore.geometry import UncertainPose, compose, relative
 from lidarcore.mapping import Mapper
 from lidarcore.mapping.matching.odometry_calibration import OdometryCalibration
 from lidarcore.simulation import World
+from lidarcore.simulation.rooms import rectangular_room
 
 SCALE, BIAS = 1.03, 0.01  # of the wheels, and rad that they turn unnoticed in a metre
 
@@ -70,3 +71,27 @@ def test_a_corridor_without_features_is_as_long_as_wheels_say_that_were_learned_
     placed = mapper.trajectory()[1]
     dark = placed[-1, 0] - placed[110, 0]  # from where the last pillar is out of sight
     assert abs(dark - (poses[-1, 0] - poses[110, 0])) < 0.01 * (poses[-1, 0] - poses[110, 0])
+
+
+def test_what_is_learned_at_the_end_of_a_corridor_holds_for_all_of_it():
+    """Of 40 m in which nothing shows wheels made 42. Only at the end scans show how far they went."""
+    corridor, rng = rectangular_room(60, 2.4), np.random.default_rng(3)
+    x = np.concatenate([np.arange(-20, 28, 0.4), np.arange(28, 22, -0.4), np.arange(22, 28, 0.4)])
+    truth = np.stack([x, 0.1 * np.sin(x), 0 * x], -1)
+    driven, scans = np.zeros(3), []
+    for k, pose in enumerate(truth):
+        if k:
+            driven = driven + (truth[k] - truth[k - 1]) * [1.05, 1.05, 1]
+        scan = full_scan(corridor, pose, NOISE, rng)
+        seen = np.where(scan.ranges < 8, scan.ranges, np.nan)
+        scans.append(replace(scan, ranges=seen, odometry=driven, stamp=float(k)))
+    mapper = Mapper(SETTINGS)
+    for scan in scans:
+        mapper.step(scan)
+    way = x[-1] - x[0]
+    assert abs(mapper.trajectory()[1][-1, 0] - way) > 1.2
+    mapper.finish()
+    assert abs(mapper.trajectory()[1][-1, 0] - way) < 0.6
+    once = mapper.trajectory()[1]
+    mapper.finish()
+    np.testing.assert_allclose(mapper.trajectory()[1], once, atol=2e-3)
