@@ -18,10 +18,13 @@ TAIL = 1e-6 / (6 * 5 * 4 * 2)
 
 
 def numeric_covariance(fit, ranges, bearings, noise):
-    """First-order covariance of fit(ranges, bearings) -> (alpha, r), by central differences of fourth order."""
+    """First-order covariance of fit(ranges, bearings) -> (alpha, r), by central differences of fourth order.
+
+    Steps are small against the noise, too: where that is next to nothing, ml weighs a beam that is moved by more anew.
+    """
     total = np.zeros((2, 2))
     for values, sigma, step in (
-        (ranges, noise.sigma_range, 1e-5 * ranges.min()),
+        (ranges, noise.sigma_range, min(1e-5 * ranges.min(), 0.02 * noise.sigma_range)),
         (bearings, noise.sigma_bearing, 1e-5),
     ):
         for i in range(len(values)):
