@@ -12,7 +12,7 @@ from lidarcore.localization.ekf.localizer import KnownMap
 from lidarcore.localization.ekf.slam import Slam, Visible
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.points import Points
-from lidarcore.localization.relocalization import relocalize
+from lidarcore.localization.relocation import relocalize
 from lidarcore.localization.settings import LocalizationSettings, NavigationSettings
 
 _REST = 5.0  # s; people who stand are clusters, and seldom stand longer

@@ -44,7 +44,7 @@ class Localizer:
         self.reset(pose, covariance)
 
     def reset(self, pose: ArrayLike, covariance: ArrayLike) -> None:
-        """Start again from a pose (3,) and its covariance (3, 3), as from a relocalization."""
+        """Start again from a pose (3,) and its covariance (3, 3), as from a relocation."""
         self._state, self._P = start(as_pose(pose, "pose"), covariance, self.settings, self._motion.size)
 
     def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
