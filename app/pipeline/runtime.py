@@ -30,9 +30,8 @@ from .settings import Settings
 logger = logging.getLogger(__name__)
 
 
-DORMANT = (
-    600  # scans, a minute of an S1: how long a corner that is hidden keeps its id while the sensor stands
-)
+# scans, a minute of an S1: how long a corner that is hidden keeps its id while the sensor stands
+DORMANT = 600
 END_WITHIN = 5.0  # s that the worker may take for the scan at hand
 
 
