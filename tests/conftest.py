@@ -11,6 +11,8 @@ import os
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import fcntl
+import importlib
+import pkgutil
 import signal
 from pathlib import Path
 
@@ -26,7 +28,11 @@ COMPILING = Path(lidarcore.__file__).parent / "__pycache__" / "compiling"
 # Longest first: with whole files handed out to the processes, a long one that comes last leaves the others idle.
 ORDER = ("browser", "evaluation", "experiments", "guide", "mapping", "localization", "laws", "app")
 
-# The same examples on every run of the same code; a busy machine is no reason to fail.
+# The same examples on every run of the same code; a busy machine is no reason to fail. Hypothesis also tries the
+# numbers in those of our modules that are loaded: all are, so that nothing depends on the tests before.
+for package in ("lidarcore", "lidarcore_app", "docs.guide"):
+    for module in pkgutil.walk_packages(importlib.import_module(package).__path__, f"{package}."):
+        importlib.import_module(module.name)
 hypothesis.settings.register_profile(
     "repeatable",
     deadline=None,

@@ -22,6 +22,10 @@ Seed = Annotated[int, typer.Option(min=0, max=MOST, help="seed of the random num
 Workers = Annotated[
     int | None, typer.Option(min=1, max=1024, help="processes; one for each core if not given")
 ]
+Mode = Annotated[
+    str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")
+]
+Rpm = Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")]
 Given = Annotated[
     bool, typer.Option("--given", help="judge the noise of the settings instead of a calibrated one")
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .options import Set, SettingsFile, end_like_ctrl_c, settings_from
+from .options import Mode, Rpm, Set, SettingsFile, end_like_ctrl_c, settings_from
 
 if TYPE_CHECKING:
     from lidarcore.rplidar import Driver
@@ -26,10 +26,8 @@ def record(
     baud: Annotated[
         int, typer.Option(min=1, max=10_000_000, help="baud rate of the sensor; that of an S1 is 256000")
     ] = 256000,
-    mode: Annotated[
-        str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")
-    ] = None,
-    rpm: Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")] = None,
+    mode: Mode = None,
+    rpm: Rpm = None,
     emulator: Annotated[bool, typer.Option("--emulator", help="record an emulated RPLIDAR S1")] = False,
     duration: Annotated[
         float | None,

@@ -7,67 +7,65 @@ from typing import Annotated
 
 import typer
 
-from .options import Set, SettingsFile, Topic, settings_from
+from .options import Mode, Rpm, Set, SettingsFile, Topic, settings_from
+
+Recording = Annotated[
+    Path | None,
+    typer.Argument(
+        help="recording to play; if not given, the connected sensor, or an emulated one if there is none"
+    ),
+]
+Host = Annotated[str, typer.Option(help="address to listen on; a token is needed unless it is local")]
+HttpPort = Annotated[int, typer.Option(min=0, max=65535, help="port of the dashboard; 0 takes any free one")]
+Port = Annotated[
+    str | None,
+    typer.Option(
+        help="serial port of the sensor, such as /dev/ttyUSB0; a mere number is taken as --http-port"
+    ),
+]
+Baud = Annotated[
+    int | None, typer.Option(min=1200, max=10_000_000, help="baud rate of the sensor; 256000 if not given")
+]
+Emulated = Annotated[bool, typer.Option("--emulator", help="use an emulated sensor, whatever is connected")]
+Recordings = Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")]
+Maps = Annotated[
+    str | None,
+    typer.Option(
+        "--map",
+        metavar="URL",
+        help="file of landmark maps; landmarks.db beside the folder of recordings if not given",
+    ),
+]
+MaxUpload = Annotated[int, typer.Option(min=1, max=1_000_000, help="largest upload, MB")]
+Token = Annotated[
+    str | None,
+    typer.Option(
+        envvar="LIDARCORE_TOKEN",
+        help="token that requests must carry; a random one is made where one is needed",
+    ),
+]
+AllowHost = Annotated[list[str] | None, typer.Option(help="another name by which this server is reached")]
+OpenBrowser = Annotated[bool, typer.Option("--open-browser", help="open the page in the browser")]
 
 
 def serve(
-    recording: Annotated[
-        Path | None,
-        typer.Argument(
-            help="recording to play; if not given, the connected sensor, or an emulated one if there is none"
-        ),
-    ] = None,
+    recording: Recording = None,
     topic: Topic = None,
-    host: Annotated[
-        str, typer.Option(help="address to listen on; a token is needed unless it is local")
-    ] = "127.0.0.1",
-    http_port: Annotated[
-        int, typer.Option(min=0, max=65535, help="port of the dashboard; 0 takes any free one")
-    ] = 8000,
-    port: Annotated[
-        str | None,
-        typer.Option(
-            help="serial port of the sensor, such as /dev/ttyUSB0; a mere number is taken as --http-port"
-        ),
-    ] = None,
-    baud: Annotated[
-        int | None,
-        typer.Option(min=1200, max=10_000_000, help="baud rate of the sensor; 256000 if not given"),
-    ] = None,
-    mode: Annotated[
-        str | None, typer.Option(help="DenseBoost or Standard; what the sensor prefers if not given")
-    ] = None,
-    rpm: Annotated[int | None, typer.Option(help="speed of the motor; 600 if not given")] = None,
-    emulator: Annotated[
-        bool, typer.Option("--emulator", help="use an emulated sensor, whatever is connected")
-    ] = False,
-    recordings: Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")] = Path(
-        "recordings"
-    ),
-    map: Annotated[
-        str | None,
-        typer.Option(
-            "--map",
-            metavar="URL",
-            help="file of landmark maps; landmarks.db beside the folder of recordings if not given",
-        ),
-    ] = None,
-    max_upload: Annotated[int, typer.Option(min=1, max=1_000_000, help="largest upload, MB")] = 1024,
-    token: Annotated[
-        str | None,
-        typer.Option(
-            envvar="LIDARCORE_TOKEN",
-            help="token that requests must carry; a random one is made where one is needed",
-        ),
-    ] = None,
-    allow_host: Annotated[
-        list[str] | None, typer.Option(help="another name by which this server is reached")
-    ] = None,
+    host: Host = "127.0.0.1",
+    http_port: HttpPort = 8000,
+    port: Port = None,
+    baud: Baud = None,
+    mode: Mode = None,
+    rpm: Rpm = None,
+    emulator: Emulated = False,
+    recordings: Recordings = Path("recordings"),
+    map: Maps = None,
+    max_upload: MaxUpload = 1024,
+    token: Token = None,
+    allow_host: AllowHost = None,
     settings: SettingsFile = None,
     set_: Set = None,
-    open_browser: Annotated[
-        bool, typer.Option("--open-browser", help="open the page in the browser")
-    ] = False,
+    open_browser: OpenBrowser = False,
 ) -> None:
     """Serve the dashboard."""
     from ..web.serving import listen, run, secured

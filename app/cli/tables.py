@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.table import Table
 
+from lidarcore.evaluation.intervals import Interval
+
 
 def console(width: int) -> Console:
     """The terminal; a file or a pipe is as wide as the tables need."""
@@ -20,3 +22,8 @@ def table(title: str | None, names: Sequence[str], figures: Sequence[str]) -> Ta
     for heading in figures:
         result.add_column(heading, justify="right")
     return result
+
+
+def span(figure: Interval, digits: int) -> str:
+    """A figure with its interval; nothing where there is none."""
+    return "" if figure.value != figure.value else figure.span(digits)

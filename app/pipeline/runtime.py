@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from lidarcore import SensorNoise, Tracker, compare, localization, warm_up
 from lidarcore.body_mask import Sector, masked, suggest_mask
 from lidarcore.clusters import cluster
+from lidarcore.evaluation.calibration.noise_check import NoiseCheck
 from lidarcore.threads import FailureLog, join
 
 from ..errors import NotFoundError
@@ -23,16 +24,14 @@ from ..sources.timed_scan import TimedScan
 from .frame import Frame, Selection
 from .navigation import NOT_LOCALIZED, LocalizationStatus, Navigation
 from .newest import NewestScan
-from .noise_check import NoiseCheck
 from .sensor_setups import SensorSetup, SensorSetups
 from .settings import Settings
 
 logger = logging.getLogger(__name__)
 
 
-DORMANT = (
-    600  # scans, a minute of an S1: how long a corner that is hidden keeps its id while the sensor stands
-)
+# scans, a minute of an S1: how long a corner that is hidden keeps its id while the sensor stands
+DORMANT = 600
 END_WITHIN = 5.0  # s that the worker may take for the scan at hand
 
 

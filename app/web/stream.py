@@ -10,6 +10,7 @@ from pydantic_core import to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lidarcore.errors import LocalizationError
+from lidarcore.landmarks import Landmark
 from lidarcore.mapping.walls import Walls
 
 from ..errors import explained
@@ -18,7 +19,6 @@ from ..jobs.recorder import AsyncRecorder
 from ..jobs.session_writer import MapChange
 from ..pipeline.frame import Frame
 from ..pipeline.runtime import Runtime
-from .map_changes import MapChanges
 from .schemas import OdometryPose
 from .serializers import frame_text
 from .wall_json import walls_text
@@ -31,6 +31,33 @@ class OdometryMessage(OdometryPose):
     """What a client may send: a pose, with its type."""
 
     type: Literal["odometry"]
+
+
+class MapChanges:
+    """Changes of the map still to be sent, the newest of each landmark; those of a session before no longer matter."""
+
+    def __init__(self) -> None:
+        self._session: int | None = None
+        self._landmarks: dict[int | None, Landmark] = {}
+        self._removed: set[int] = set()
+
+    def __bool__(self) -> bool:
+        return self._session is not None
+
+    def add(self, change: MapChange) -> None:
+        if change.session != self._session:
+            self._session = change.session
+            self._landmarks.clear()
+            self._removed.clear()
+        for id_ in change.removed:
+            self._landmarks.pop(id_, None)
+        self._removed.update(change.removed)
+        self._landmarks.update((landmark.id, landmark) for landmark in change.landmarks)
+
+    def text(self) -> str:
+        """The changes as JSON."""
+        rows = list(self._landmarks.values())
+        return to_json({"session": self._session, "changed": rows, "removed": sorted(self._removed)}).decode()
 
 
 class Mailbox:

@@ -11,9 +11,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
 SEND_BUFFER = 1 << 15  # bytes: what the kernel may hold back of a slow client, so that nothing in it gets old
-HEAD_WITHIN = (
-    10.0  # s from the connection, or from the answer before, until the head of a request is complete
-)
+# s from the connection, or from the answer before, until the head of a request is complete
+HEAD_WITHIN = 10.0
 BODY_WITHIN = 30.0  # s between two pieces of a body
 MOST_UNFINISHED = 256  # requests that are still arriving at once; one more, and the oldest is dropped
 MOST_FILES = 16384  # handles of files and connections that this process asks the system for

@@ -12,9 +12,8 @@ from lidarcore.lines.regression import Normal, Sym2, Work
 from lidarcore.noise import NoiseModel
 
 _PRIOR_WEIGHT = 4.0  # of a room's unevenness against the independent stretches of one wall
-_GROSS = (
-    9.0  # variances: a residual, or a step between neighbours, counts for no more in what is a wall's own
-)
+# variances: a residual, or a step between neighbours, counts for no more in what is a wall's own
+_GROSS = 9.0
 _ROUGH_WEIGHT = 16.0  # of the roughness expected against the beams of one wall
 _SMOOTHEST = 0.25  # of the variance expected: ranges may also be alike because the sensor smooths them
 

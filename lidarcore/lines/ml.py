@@ -21,9 +21,8 @@ from lidarcore.lines.regression import (
 from lidarcore.noise import NoiseModel
 
 _STEPS = 50
-_CONVERGED = (
-    1e-12  # chi-square of the last step: the line moves by less than a millionth of its standard deviation
-)
+# chi-square of the last step: the line moves by less than a millionth of its standard deviation
+_CONVERGED = 1e-12
 _NEAR_ENOUGH = 1e-6  # the same with robust weights, which change from step to step and converge slowly
 _FARTHEST = 4.0  # standard deviations: a bearing is not sought farther off
 

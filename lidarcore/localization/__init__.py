@@ -10,7 +10,7 @@ from lidarcore.localization.landmarks import Landmarks, from_stored, to_stored
 from lidarcore.localization.navigator import Navigator
 from lidarcore.localization.points import Points
 from lidarcore.localization.precompile import warm_up
-from lidarcore.localization.relocalization import Relocation, relocalize
+from lidarcore.localization.relocation import Relocation, relocalize
 from lidarcore.localization.settings import (
     LocalizationSettings,
     NavigationSettings,

@@ -13,9 +13,8 @@ from lidarcore.geometry import compose, relative
 from lidarcore.localization.ekf.estimate import Instant
 from lidarcore.localization.settings import LocalizationSettings
 
-_AGREEING = (
-    3  # scans in a row that have to agree before a new clock or odometry, or that there is none, is believed
-)
+# scans in a row that have to agree before a new clock or odometry, or that there is none, is believed
+_AGREEING = 3
 _PERIOD = 0.1  # s, for a gap that the clock cannot tell
 _LONGEST = 10.0  # s without knowledge, after which nothing is known
 _RECENT = 30  # scans from which the usual period and speed are known

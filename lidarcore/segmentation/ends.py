@@ -13,9 +13,8 @@ from lidarcore.segmentation.split import variance
 
 _PASSES = 2  # the lines follow their ends: the first pass takes out most of what is the neighbour's
 _REACH, _REACH_ANGLE = 12, 0.08  # points, and rad, looked at on each side of a common end: whichever is more
-_STEP_CHI2 = (
-    16.0  # any other end is by chance so much likelier at less than 1 of 2981 corners: exp(-chi2 / 2)
-)
+# any other end is by chance so much likelier at less than 1 of 2981 corners: exp(-chi2 / 2)
+_STEP_CHI2 = 16.0
 
 
 @inlined

@@ -8,9 +8,8 @@ from lidarcore.noise import NoiseModel
 from lidarcore.segmentation.moments import CHI2, SQUARES, copy, join, residuals
 from lidarcore.segmentation.pieces import Pieces
 
-_MERGE_CHI2 = (
-    25.0  # far out for the two or three parameters saved: splits are chosen at extremes, not at random
-)
+# far out for the two or three parameters saved: splits are chosen at extremes, not at random
+_MERGE_CHI2 = 25.0
 
 
 @kernel

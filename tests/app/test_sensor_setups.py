@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lidarcore_app.jobs.sensor_memory import MOST, SensorMemory
-from lidarcore_app.pipeline.noise_check import SCANS
 from lidarcore_app.pipeline.sensor_setups import SensorSetup, SensorSetups
 from lidarcore_app.sources.live import DeviceOptions
 from lidarcore_app.sources.recorded import RecordingSource
@@ -15,6 +14,7 @@ from serving import Server, write_room
 
 from lidarcore import SensorNoise
 from lidarcore.body_mask import MOST_SECTORS, Sector
+from lidarcore.evaluation.calibration.noise_check import SCANS
 from lidarcore.rplidar.emulation.options import EmulatorOptions
 from lidarcore.simulation.settings import SimulationSettings
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from lidarcore import SensorNoise, extract
 from lidarcore.evaluation.calibration.calibrate import calibrate
 from lidarcore.evaluation.calibration.profiles import Profile, profiles
-from lidarcore.evaluation.calibration.true_walls import held
+from lidarcore.evaluation.calibration.trial import held
 from lidarcore.evaluation.calibration.unevenness import unevenness
 from lidarcore.evaluation.calibration.wall_beams import beams_on_walls
 from lidarcore.settings import ExtractionSettings

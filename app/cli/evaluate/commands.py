@@ -48,44 +48,50 @@ evaluate = typer.Typer(
 evaluate.command("map")(evaluate_map)
 
 
+Rooms = Annotated[
+    list[str] | None,
+    typer.Option(help="a simulated world, or a rectangle in m such as 4.5x2.5; may be repeated"),
+]
+Noises = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="RANGE,BEARING",
+        help="noise of the sensor: sigmas in m and rad, e.g. 0.02,0.0034; may be repeated",
+    ),
+]
+WhichSegments = Annotated[
+    str, typer.Option(help="segments to use: known, found (by the real segmentation), or both")
+]
+Trials = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        max=MOST,
+        help="corner trials in all, each by every method; "
+        "rounded up to whole blocks for each room, noise and segmentation",
+    ),
+]
+Beams = Annotated[int, typer.Option(min=90, max=100_000, help="beams in a revolution")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="a Dask scheduler, e.g. tcp://host:8786, whose workers do the work"),
+]
+Report = Annotated[Path | None, to_file("FILE.html for a report; FILE.json or FILE.csv with every figure")]
+ByRoom = Annotated[bool, typer.Option("--by-room", help="also print a table for each room")]
+
+
 @evaluate.command()
 def consistency(
-    room: Annotated[
-        list[str] | None,
-        typer.Option(help="a simulated world, or a rectangle in m such as 4.5x2.5; may be repeated"),
-    ] = None,
-    noise: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="RANGE,BEARING",
-            help="noise of the sensor: sigmas in m and rad, e.g. 0.02,0.0034; may be repeated",
-        ),
-    ] = None,
-    segments: Annotated[
-        str, typer.Option(help="segments to use: known, found (by the real segmentation), or both")
-    ] = "both",
-    trials: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=MOST,
-            help="corner trials in all, each by every method; "
-            "rounded up to whole blocks for each room, noise and segmentation",
-        ),
-    ] = 100_000,
-    beams: Annotated[int, typer.Option(min=90, max=100_000, help="beams in a revolution")] = 920,
+    room: Rooms = None,
+    noise: Noises = None,
+    segments: WhichSegments = "both",
+    trials: Trials = 100_000,
+    beams: Beams = 920,
     seed: Seed = 0,
     workers: Workers = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="a Dask scheduler, e.g. tcp://host:8786, whose workers do the work"
-        ),
-    ] = None,
-    output: Annotated[
-        Path | None, to_file("FILE.html for a report; FILE.json or FILE.csv with every figure")
-    ] = None,
-    by_room: Annotated[bool, typer.Option("--by-room", help="also print a table for each room")] = False,
+    scheduler: Scheduler = None,
+    output: Report = None,
+    by_room: ByRoom = False,
     for_programs: ForPrograms = False,
 ) -> None:
     """Bias, RMS error, coverage, ANEES and ellipse areas of every fitter with both covariances."""

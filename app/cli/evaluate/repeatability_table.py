@@ -4,10 +4,9 @@ from collections.abc import Iterator, Sequence, Sized
 
 from rich.table import Table
 
-from lidarcore.evaluation.intervals import Interval
 from lidarcore.evaluation.repeatability.summary import Box, Claim, Method, Summary, has_other_tails
 
-from ..tables import table
+from ..tables import span, table
 from .consistency_table import COLOURS
 
 MICRO = 1e6  # mm² in a m², mrad mm in a rad m
@@ -45,13 +44,14 @@ def _table(title: str, what: str, unit: str, methods: Sequence[tuple[Method, Siz
     for method, features in methods:
         for kind, claim in method.claims.items():
             judged = claim.judgement
+            figures = (judged.area_ratio, judged.coverage_50, judged.coverage_95, judged.coverage_99)
             result.add_row(
                 method.name,
                 kind,
                 str(len(features)),
                 *_box(claim.areas),
                 "" if method.actual_area is None else f"{MICRO * method.actual_area:.2f}",
-                *map(_cell, (judged.area_ratio, judged.coverage_50, judged.coverage_95, judged.coverage_99)),
+                *(span(figure, 2) for figure in figures),
                 _verdict(claim),
             )
     return result
@@ -68,7 +68,3 @@ def _box(box: Box | None) -> tuple[str, str]:
     if box is None:
         return "", ""
     return f"{MICRO * box.median:.2f}", f"{MICRO * box.first_quartile:.2f}–{MICRO * box.third_quartile:.2f}"
-
-
-def _cell(figure: Interval) -> str:
-    return "" if figure.value != figure.value else figure.span(2)

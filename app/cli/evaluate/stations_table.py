@@ -2,11 +2,10 @@
 
 from rich.table import Table
 
-from lidarcore.evaluation.intervals import Interval
 from lidarcore.evaluation.stations.limits import REFERENCE, limits
 from lidarcore.evaluation.stations.study import Figures, StationStudy
 
-from ..tables import table
+from ..tables import span, table
 
 
 def methods_table(study: StationStudy) -> Table:
@@ -23,9 +22,9 @@ def methods_table(study: StationStudy) -> Table:
             result.add_row(
                 name,
                 method,
-                _cell(figures.coverage(m), 3),
+                span(figures.coverage(m), 3),
                 "" if extremes is None else f"{extremes[0]:.2f}, {extremes[1]:.2f}",
-                _cell(figures.area_ratio(m), 2),
+                span(figures.area_ratio(m), 2),
                 _against(study, figures, m),
                 str(int((figures.counts[:, m] > 0).sum())),
                 f"{figures.sightings(m):,}",
@@ -75,8 +74,4 @@ def _held(held: tuple[float, int] | None) -> tuple[str, str]:
 def _against(study: StationStudy, figures: Figures, m: int) -> str:
     if REFERENCE not in study.methods or study.methods[m] == REFERENCE:
         return ""
-    return _cell(figures.scatter_against(m, study.methods.index(REFERENCE)), 2)
-
-
-def _cell(figure: Interval, digits: int) -> str:
-    return "" if figure.value != figure.value else figure.span(digits)
+    return span(figures.scatter_against(m, study.methods.index(REFERENCE)), 2)

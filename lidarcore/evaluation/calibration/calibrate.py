@@ -23,9 +23,8 @@ LEAST_SCANS = 10
 BANDS = 4  # of range and of incidence, each with as many beams
 LEAST_BINS = 3 * BANDS
 STILL = 0.03  # m, a wall that moves more is not seen by a sensor at rest
-_START = (
-    0.004  # m: walls are told apart by their unevenness, which is found from walls; at least as much as usual
-)
+# m: walls are told apart by their unevenness, which is found from walls; at least as much as usual
+_START = 0.004
 _PASSES = 4
 _ACROSS = 0.1  # parallel walls say nothing of a motion along them
 _AGREE = 0.1

@@ -13,9 +13,8 @@ from lidarcore.settings import ExtractionSettings
 _LEAST = 10  # observations of a wall
 _HELD = 0.95  # of the scatter of walls, by ellipses of 95 %
 _WINDOW = 100  # scans: what drifts for longer is not noise
-_SETTLING = (
-    10  # scans after a start, of real sensors: walls lie four times as far off as later, and then no more
-)
+# scans after a start, of real sensors: walls lie four times as far off as later, and then no more
+_SETTLING = 10
 _LAGS = 8  # scans apart, at which bearings are compared
 
 _STEPS = np.linspace(0.0, 1.0, 21)

@@ -1,13 +1,12 @@
 """A study of calibrations as JSON."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from lidarcore import files
 from lidarcore.evaluation.calibration.study import CalibrationStudy, Cell
-from lidarcore.files.texts import finite
+from lidarcore.files.texts import json_text
 
 
 def write(study: CalibrationStudy, path: Path) -> None:
@@ -27,7 +26,7 @@ def write(study: CalibrationStudy, path: Path) -> None:
             for cell in study.cells
         ],
     }
-    files.write(path, json.dumps(finite(document), indent=1, allow_nan=False) + "\n")
+    files.write(path, json_text(document))
 
 
 def _ellipses(cell: Cell, of: int) -> dict[str, Any]:

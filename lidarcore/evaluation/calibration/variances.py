@@ -16,9 +16,8 @@ _STEPS = 300
 _HALVINGS = 50
 _ARMIJO = 0.1  # of the gain that the slope promises, a step has to make
 _ENOUGH = 1e-6  # of log-likelihood to be gained: the maximum is within a thousandth of a standard error
-_FLOOR = (
-    1e-6  # of the mean variance, in every variance: the likelihood has bounds, and sigma an error below 1e-3
-)
+# of the mean variance, in every variance: the likelihood has bounds, and sigma an error below 1e-3
+_FLOOR = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +58,10 @@ def variance_model(variances: Array, dof: Array, lever2: Array, by: Array, bands
     each. Maximum likelihood for Gaussian errors; the intervals hold for others, too (sandwich covariance). Raises
     EvaluationError if nothing scatters, or if no maximum is found.
     """
-    mean = float(np.average(variances, weights=dof))
-    if not mean > 0:
-        raise EvaluationError("The ranges are the same in every scan: there is no noise to be measured.")
     edges = _quantiles(by, dof, bands)
     band = np.clip(np.searchsorted(edges, by, side="right") - 1, 0, bands - 1)
-    sample = _Sample(np.column_stack([np.eye(bands)[band], lever2]), variances, dof, _FLOOR * mean)
-    beta = _maximum_likelihood(sample)
-    covariance = _sandwich(sample, beta)
-    *sigmas, slope = (_root(b, v) for b, v in zip(beta, np.diag(covariance), strict=True))
+    beta, covariance = _fit(variances, dof, np.column_stack([np.eye(bands)[band], lever2]))
+    *sigmas, slope = _roots(beta, covariance)
     return Bands(tuple(edges.tolist()), tuple(sigmas), slope, _same(beta[:-1], covariance[:-1, :-1]))
 
 
@@ -76,13 +70,17 @@ def variance_parts(variances: Array, dof: Array, X: Array) -> list[Interval]:
 
     As `variance_model` does, which has bands for columns, and the lever.
     """
+    return _roots(*_fit(variances, dof, X))
+
+
+def _fit(variances: Array, dof: Array, X: Array) -> tuple[Array, Array]:
+    """The likeliest beta (P,), and its covariance (P, P)."""
     mean = float(np.average(variances, weights=dof))
     if not mean > 0:
         raise EvaluationError("The ranges are the same in every scan: there is no noise to be measured.")
     sample = _Sample(X, variances, dof, _FLOOR * mean)
     beta = _maximum_likelihood(sample)
-    covariance = _sandwich(sample, beta)
-    return [_root(b, v) for b, v in zip(beta, np.diag(covariance), strict=True)]
+    return beta, _sandwich(sample, beta)
 
 
 def _quantiles(by: Array, weights: Array, bands: int) -> Array:
@@ -146,9 +144,10 @@ def _sandwich(sample: _Sample, beta: Array) -> Array:
     return covariance
 
 
-def _root(value: float, variance: float) -> Interval:
-    half = _Z * float(np.sqrt(variance))
-    return Interval(float(value), float(value) - half, float(value) + half).root()
+def _roots(beta: Array, covariance: Array) -> list[Interval]:
+    half = _Z * np.sqrt(np.diag(covariance))
+    rows = np.column_stack([beta, beta - half, beta + half]).tolist()
+    return [Interval(*row).root() for row in rows]
 
 
 def _same(beta: Array, covariance: Array) -> float:

@@ -1,16 +1,17 @@
 """Beams that meet the walls around a sensor at rest, and how far from the walls' lines they end."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.errors import EvaluationError
 from lidarcore.extraction import extract
 from lidarcore.lines import Line
 from lidarcore.noise import SensorNoise
-from lidarcore.scan import Array, Ints, Scan
+from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
 BIN = np.radians(1.0)  # in which a wall may be off its line by any amount, if it is so in every scan
@@ -22,7 +23,7 @@ _LEAST_SPREAD = 1e-4  # m
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WallBeams:
+class WallBeams(Columns):
     """Beams (N,) on walls, the walls' lines as they are at the bearings reported.
 
     error m, of the range; lever m, rho tan(incidence), by which an error of the bearing acts; ranges m; incidence
@@ -37,9 +38,6 @@ class WallBeams:
     scan: Ints
     wall: Ints
     bin: Ints
-
-    def __getitem__(self, which: NDArray[np.bool_]) -> "WallBeams":
-        return WallBeams(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def near(self) -> NDArray[np.bool_]:
         """(N,) whether a beam ends where noise lets it, judged by the other scans' beams in its bin."""

@@ -1,24 +1,22 @@
 """The white noise of beams, from neighbouring bearings in which the pattern of a wall cancels."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln, ndtr
 
+from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.evaluation.calibration.variances import variance_parts
 from lidarcore.evaluation.calibration.wall_beams import WallBeams
 from lidarcore.evaluation.intervals import Interval
-from lidarcore.scan import Array, Ints
 
 LEAST_PAIRS = 10  # neighbours in a bin
 _DOF = 2 / 3  # of a squared difference of neighbours: each beam is in two of them [von Neumann 1941]
 _WINSOR = 2.5  # standard deviations: a difference counts for no more
 _ROUNDS = 20
 _TAILS = np.array([0.0, 0.05, 0.1, 0.15, 0.2, 0.25])  # heavier ones make weights that leave little to walls
-_STEPPED = (
-    6.0  # times what is expected: a bin with so much scatter holds a step of the wall, or something moved
-)
+# times what is expected: a bin with so much scatter holds a step of the wall, or something moved
+_STEPPED = 6.0
 _MOST_STEPPED = 0.2  # of the bins
 _TELLING = 10.0  # of log-likelihood that heavier tails have to gain
 _AROUND = 4  # neighbours on each side whose median a beam is held against
@@ -28,7 +26,7 @@ White = tuple[Interval, Interval, Interval]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scatter:
+class Scatter(Columns):
     """Scatter in M bins: variance (M,) m² of white errors, degrees of freedom, means of lever² m², range m and range⁴
     m⁴, and of incidence rad."""
 
@@ -38,9 +36,6 @@ class Scatter:
     ranges: Array
     range4: Array
     incidence: Array
-
-    def __getitem__(self, which: NDArray[np.bool_]) -> "Scatter":
-        return Scatter(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 def white_scatter(beams: WallBeams) -> Scatter:

@@ -44,7 +44,7 @@ class Localizer:
         self.reset(pose, covariance)
 
     def reset(self, pose: ArrayLike, covariance: ArrayLike) -> None:
-        """Start again from a pose (3,) and its covariance (3, 3), as from a relocalization."""
+        """Start again from a pose (3,) and its covariance (3, 3), as from a relocation."""
         self._state, self._P = start(as_pose(pose, "pose"), covariance, self.settings, self._motion.size)
 
     def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
@@ -52,6 +52,11 @@ class Localizer:
         self.settings = replace(self.settings, motion=motion)
         self._motion = motion_model(self.settings, with_velocity=False)
         self.reset(self._state[:3], self._P[:3, :3])
+
+    def displace(self, increment: Array, covariance: Array) -> None:
+        """Move by an increment (3,) seen from the sensor, with its covariance (3, 3), which leaves no velocity."""
+        here = UncertainPose(self._state[:3], self._P[:3, :3])
+        self.reset(*here.compose(UncertainPose(increment, covariance)))
 
     def restart_clock(self) -> None:
         """Take the next stamp and odometry as they come, after a clock or an encoder was reset."""
@@ -116,13 +121,8 @@ class KnownMap:
         self.settings, self.is_at_odds = settings, False
         self.map = landmarks.subset(landmarks.confirmed)
         self._localizer = Localizer(self.map.points, pose, covariance, settings)
-        self._pose, self._covariance = np.asarray(pose, np.float64), np.asarray(covariance, np.float64)
+        self.reset, self.displace = self._localizer.reset, self._localizer.displace
         self.restart_clock = self._localizer.restart_clock
-
-    def reset(self, pose: ArrayLike, covariance: ArrayLike) -> None:
-        """Go on from a pose (3,) with covariance (3, 3), as `Slam.reset` does."""
-        self._localizer.reset(pose, covariance)
-        self._pose, self._covariance = np.asarray(pose, np.float64), np.asarray(covariance, np.float64)
 
     def step(
         self,
@@ -134,7 +134,6 @@ class KnownMap:
     ) -> Estimate:
         """One scan, as in `Slam.step`; nothing is ever added to the map or dropped from it."""
         estimate = self._localizer.step(observed, stamp, odometry, times)
-        self._pose, self._covariance = estimate.pose, estimate.covariance
         if visible is not None:
             z = act_inverse(estimate.pose, self.map.points.xy)
             possible = min(int((visible(z).unseen > 0).sum()), len(observed))
@@ -148,12 +147,6 @@ class KnownMap:
             last_seen=np.where(seen, stamp, self.map.last_seen),
         )
         return estimate
-
-    def displace(self, increment: Array, covariance: Array) -> None:
-        """Move by an increment (3,) seen from the sensor, with its covariance (3, 3), as `Slam.displace` does."""
-        here = UncertainPose(self._pose, self._covariance)
-        self._pose, self._covariance = here.compose(UncertainPose(increment, covariance))
-        self.reset(self._pose, self._covariance)
 
     def drive_by(self, motion: Literal["odometry", "constant velocity"]) -> None:
         """Predict by this from now on, as `Slam.drive_by` does."""

@@ -6,7 +6,7 @@ from walks import POSTS, nees, sight, sighting, true_path
 from lidarcore.errors import LostError
 from lidarcore.geometry import act_inverse
 from lidarcore.localization import Localizer, Points
-from lidarcore.localization.relocalization import relocalize
+from lidarcore.localization.relocation import relocalize
 
 MAP = Points(POSTS, 1e-6 * np.eye(2), "post")
 
