@@ -13,16 +13,7 @@ from scipy.sparse import coo_array, csr_array
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import rotate
 from lidarcore.mapping.cells import cells
-from lidarcore.mapping.graph.adjustment_cells import (
-    Groups,
-    Lines,
-    Noise,
-    Observations,
-    Sums,
-    fit_cells,
-    sum_cells,
-)
-from lidarcore.mapping.graph.line_normals import line_normals
+from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells
 
 _GAP = 0.15  # m between two surfaces side by side
 _BEYOND = 1e6  # m between two islands
@@ -53,16 +44,10 @@ def normal_equations(
     turned = Observations(
         seen.keyframes[order], arms[order], normals[order], seen.variances[order], seen.near[order]
     )
-    K, G, C = len(poses), len(order), len(starts) - 1
-    noise = Noise(scale, unevenness**2)
-    lines = Lines(
-        np.zeros((C, 4)), np.zeros((C, 2)), np.zeros((C, 2, 2)), np.zeros((G, 3)), np.zeros(C, bool)
-    )
-    fit_cells(turned, starts, poses, noise, lines)
-    directions = line_normals(lines, islands[turned.keyframes[starts[:-1]]])
+    K, G = len(poses), len(order)
     sums = Sums(np.zeros((K, 3, 3)), np.zeros((K, 3)), np.empty((G, 3, 2)), np.empty((G, 2), np.int64))
     groups = Groups(*np.empty((4, G)))
-    number, shared = sum_cells(turned, starts, lines, directions, sums, groups)
+    number, shared = sum_cells(turned, starts, poses, Noise(scale, unevenness**2), sums, groups)
     information = _sparse(sums.D, sums.U[:number], sums.at[:number], shared)
     return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups))), shared
 

@@ -63,25 +63,8 @@ class Sums(NamedTuple):
     at: Ints
 
 
-class Lines(NamedTuple):
-    """The lines r = a + b t of C cells, and how M patches lie to them.
-
-    frames   (C, 4) middle of a cell and mean normal of its patches, from which r and t count
-    fits     (C, 2) a m and b
-    N        (C, 2, 2) information of both
-    patches  (M, 3) r m and t m of each patch, and its weight
-    shared   (C,) whether several keyframes saw the cell: of others nothing is told
-    """
-
-    frames: Array
-    fits: Array
-    N: Array
-    patches: Array
-    shared: Bools
-
-
 class _Scratch(NamedTuple):
-    """Of all patches: how far they lie across and along, from the middle of their cell, m, and their weights."""
+    """Of one cell at a time: how far patches lie across and along, from their middle, m, and their weights."""
 
     r: Array
     t: Array
@@ -89,33 +72,23 @@ class _Scratch(NamedTuple):
 
 
 @kernel
-def fit_cells(turned: Observations, starts: Ints, poses: Array, noise: Noise, lines: Lines) -> None:
-    """Fits the cells that several keyframes saw, patches turned as the map is."""
-    keyframes = turned.keyframes
-    r, t, weights = lines.patches[:, 0], lines.patches[:, 1], lines.patches[:, 2]
-    scratch, m = _Scratch(r, t, weights), np.empty(2)
-    for cell in range(len(starts) - 1):
-        low, high = starts[cell], starts[cell + 1]
-        lines.shared[cell] = keyframes[low] != keyframes[high - 1]
-        if lines.shared[cell]:
-            _line(turned, poses, low, high, scratch, lines.frames[cell])
-            _weigh(turned, noise, low, high, weights)
-            lines.fits[cell] = _fit(turned, noise, low, high, scratch, lines.N[cell], m)
-
-
-@kernel
 def sum_cells(
-    turned: Observations, starts: Ints, lines: Lines, normals: Array, sums: Sums, groups: Groups
+    turned: Observations, starts: Ints, poses: Array, noise: Noise, sums: Sums, groups: Groups
 ) -> tuple[int, int]:
-    """Adds up the cells, whose lines have normals (C, 2); the number of groups and of cells that count."""
+    """Adds up the cells that several keyframes saw, patches turned as the map is; the number of groups and of cells."""
     keyframes, arms, variances = turned.keyframes, turned.means, turned.variances
     D, g, U, at = sums.D, sums.g, sums.U, sums.at
-    number, shared, S = 0, 0, np.empty((3, 2))
+    number, lines = 0, 0
+    N, m, S = np.empty((2, 2)), np.empty(2), np.empty((3, 2))
+    r, t, weights = np.empty(len(keyframes)), np.empty(len(keyframes)), np.empty(len(keyframes))
+    scratch = _Scratch(r, t, weights)
     for cell in range(len(starts) - 1):
-        if not lines.shared[cell]:
+        low, high = starts[cell], starts[cell + 1]
+        if keyframes[low] == keyframes[high - 1]:
             continue
-        low, high, N, (a, b) = starts[cell], starts[cell + 1], lines.N[cell], lines.fits[cell]
-        nx, ny = normals[cell]
+        nx, ny = _line(turned, poses, low, high, scratch)
+        _weigh(turned, noise, low, high, weights)
+        a, b = _fit(turned, noise, low, high, scratch, N, m)
         det, l00, l10, l11 = _inverse_root(N)
         i = low
         while i < high:
@@ -123,32 +96,31 @@ def sum_cells(
             S[:] = 0.0
             mean, information, lever, total = 0.0, 0.0, 0.0, 0.0
             while j < high and keyframes[j] == k:
-                r, t, w = lines.patches[j]
-                left = r - a - b * t
+                w, left = weights[j], r[j] - a - b * t[j]
                 J = nx, ny, ny * arms[j, 0] - nx * arms[j, 1]
                 for p in range(3):
                     g[k, p] += w * J[p] * left
                     S[p, 0] += w * J[p]
-                    S[p, 1] += w * J[p] * t
+                    S[p, 1] += w * J[p] * t[j]
                     for q in range(3):
                         D[k, p, q] += w * J[p] * J[q]
                 mean += left / variances[j]
                 information += 1 / variances[j]
-                lever += w * t
+                lever += w * t[j]
                 total += w
                 j += 1
             for p in range(3):
                 U[number, p, 0] = S[p, 0] * l00 + S[p, 1] * l10
                 U[number, p, 1] = S[p, 1] * l11
-            at[number, 0], at[number, 1] = k, shared
+            at[number, 0], at[number, 1] = k, lines
             lever /= max(total, 1e-12)
             leverage = total * (N[1, 1] - 2 * N[0, 1] * lever + N[0, 0] * lever * lever) / det
             groups.squares[number], groups.variances[number] = (mean / information) ** 2, 1 / information
             groups.left[number], groups.near[number] = 1 - leverage, turned.near[i]
             number += 1
             i = j
-        shared += 1
-    return number, shared
+        lines += 1
+    return number, lines
 
 
 @kernel
@@ -161,8 +133,8 @@ def _inverse_root(N: Array) -> tuple[float, float, float, float]:
 
 
 @kernel
-def _line(turned: Observations, poses: Array, low: int, high: int, scratch: _Scratch, frame: Array) -> None:
-    """Middle and mean normal of a cell, and how far its patches lie across and along, from there."""
+def _line(turned: Observations, poses: Array, low: int, high: int, scratch: _Scratch) -> tuple[float, float]:
+    """Mean normal of a cell, and how far its patches lie across and along, from their middle."""
     keyframes, arms, normals = turned.keyframes, turned.means, turned.normals
     nx = ny = x = y = 0.0
     for i in range(low, high):
@@ -172,10 +144,10 @@ def _line(turned: Observations, poses: Array, low: int, high: int, scratch: _Scr
         y += poses[keyframes[i], 1] + arms[i, 1]
     x, y, norm = x / (high - low), y / (high - low), np.hypot(nx, ny)
     nx, ny = nx / norm, ny / norm
-    frame[0], frame[1], frame[2], frame[3] = x, y, nx, ny
     for i in range(low, high):
         u, v = poses[keyframes[i], 0] + arms[i, 0] - x, poses[keyframes[i], 1] + arms[i, 1] - y
         scratch.r[i], scratch.t[i] = nx * u + ny * v, nx * v - ny * u
+    return nx, ny
 
 
 @kernel
