@@ -1,5 +1,6 @@
 """Poses found in a known map: branch and bound against brute force, simulated rooms, and a mirror that fools nobody."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -197,3 +198,17 @@ def test_a_place_that_the_map_contradicts_a_little_more_is_a_rival_still():
     new = np.sin(40 * scan.bearings) > np.cos(0.07 * np.pi)  # 7 % of the beams end in the open
     seen = Scan(np.where(new, 0.6 * scan.ranges, scan.ranges), scan.bearings)
     assert Relocator(both).find(query_of([seen])).verdict in ("several places", "no fit")
+
+
+@pytest.mark.parametrize(("points", "verdict"), [(45, "too few points"), (150, "found")])
+def test_few_points_have_to_fit_better_than_many(points, verdict):
+    """A fifth of what is seen has been moved since: of 150 points the rest is enough, of 45 it may be chance."""
+    relocator, pose = Relocator(furnished()), random_pose(furnished_room(), np.random.default_rng(8))
+    query = query_of([scan_at(furnished_room(), pose)], np.zeros((1, 3)))
+    rng = np.random.default_rng(1)
+    chosen = query.points[rng.permutation(len(query.points))[:points]]
+    assert len(chosen) == points
+    moved = np.where(rng.random(points)[:, None] < 0.2, chosen * 0.75, chosen)
+    found = relocator.find(replace(query, points=moved))
+    assert found.verdict == verdict
+    assert found.fit == pytest.approx(0.86, abs=0.03)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
+from scipy.special import rel_entr
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import UncertainPose, act, compose, largest_variance, relative, rotate, rotation, wrap
@@ -18,6 +19,7 @@ Verdict = Literal["found", "too few points", "no fit", "several places"]
 
 _APART = (0.8, 0.35)  # m, rad: poses closer than both are one place
 _MOST_PLACES = 12  # where the points fit, from which on nothing tells them apart
+_CHANCE = 1 / 3  # share of a scan's points that fit at a place where it was not taken
 _SIGMAS = 3.0  # of a guess, within which a pose is looked for
 _NEAR_LEVEL = 3  # of the squares in which it is, at least
 
@@ -78,6 +80,8 @@ class Relocator:
         found = self._best(
             query, angles, np.arange(len(angles)), LEVELS - 1, (0, 0, width, height), self.settings.against
         )
+        if found is not None and found.found and self._may_be_chance(found.fit, len(query.points)):
+            return replace(found, verdict="too few points")
         return found or _nowhere("no fit")
 
     def find_near(self, query: Query, guess: UncertainPose) -> Relocation:
@@ -149,6 +153,10 @@ class Relocator:
             verdict, *self._in_world(pose, covariance), best.fit, best.against, max(rivals, default=0.0)
         )
 
+    def _may_be_chance(self, fit: float, points: int) -> bool:
+        """Whether points that fit that well say less for a place than as many as are ever matched, if they just fit."""
+        return _evidence(fit, points) < _evidence(self.settings.fit, self.settings.most_points)
+
     def _as_guessed(self, query: Query, at: Array) -> Relocation:
         """How well a pose (3,) in cells of the field fits, which is not found."""
         columns, rows = _turned(query.points / self._grid.resolution, at[2:])
@@ -190,6 +198,12 @@ def _turned(points: Array, angles: Array) -> Turned:
     """The points at headings, from the middle of the sensor's cell."""
     x, y = np.moveaxis(rotate(angles[:, None], points), -1, 0)
     return Turned(np.floor(x + 0.5).astype(np.int32), np.floor(y + 0.5).astype(np.int32))
+
+
+def _evidence(fit: float, points: int) -> float:
+    """Log-likelihood ratio of a place at which points fit that well to one at which they fit by chance."""
+    fit = max(fit, _CHANCE)
+    return points * float(rel_entr(fit, _CHANCE) + rel_entr(1 - fit, 1 - _CHANCE))
 
 
 def _nowhere(verdict: Verdict) -> Relocation:
