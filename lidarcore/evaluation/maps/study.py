@@ -38,7 +38,8 @@ class MapStudy:
     normalised  (S,) squared errors of pairs of keyframes in units of their claimed covariance, 3 dof
     allowed     (S,) the same, the reference being allowed its own error
     relations   (R, 3) m and rad errors of relations verified by hand, and s from their stamps to the next scan
-    of_reference  (R, 3) the same of the reference poses, (0, 3) without them
+    of_reference
+                (R, 3) the same of the reference poses, (0, 3) without them
     """
 
     scans: int
@@ -103,12 +104,11 @@ def study(
         pairs = _lengths(relative_errors(poses, reference, close_pairs(reference)))
         normalised, allowed = _normalised(mapper, reference[numbers], own)
         wrong = wrong_loops(mapper.loops, reference[numbers])
-    found, theirs = (
-        np.empty((0, 3))
-        if relations is None or of_them is None
-        else relation_errors(relations, stamps, of_them)
-        for of_them in (poses, reference)
-    )
+    found, theirs = np.empty((0, 3)), np.empty((0, 3))
+    if relations is not None:
+        found = relation_errors(relations, stamps, poses)
+        if reference is not None:
+            theirs = relation_errors(relations, stamps, reference)
     return MapStudy(
         len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, _most_megabytes(),
         pairs, normalised, allowed, found, theirs,

@@ -27,7 +27,7 @@ _FOUND = np.diag([0.05, 0.05, 0.02]) ** 2  # how well it is known where an islan
 _SETTLED = 0.01  # m and rad of the last step, after which the poses are far better than that
 
 
-class _Drive(NamedTuple):
+class _Driven(NamedTuple):
     """How a keyframe's edge hangs on odometry.
 
     edge   number in the graph
@@ -55,7 +55,7 @@ class BackEnd:
         self.loops: list[Loop] = []
         self.keyframes: dict[int, Keyframe] = {}
         self.steps: list[Step] = []
-        self._drives: dict[int, _Drive] = {}  # by the number of the step
+        self._driven: dict[int, _Driven] = {}  # by the number of the step
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
 
@@ -72,7 +72,7 @@ class BackEnd:
         self.steps.append(Step(tracked.node, node, *tracked.moved))
         edge = self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
         if tracked.wheels is not None and not tracked.island:
-            self._drives[len(self.steps) - 1] = _Drive(edge, tracked.wheels, _share(tracked))
+            self._driven[len(self.steps) - 1] = _Driven(edge, tracked.wheels, _share(tracked))
         if tracked.island:
             self._islands.begin(node)
         self._join(node)
@@ -100,13 +100,13 @@ class BackEnd:
 
     def recalibrate(self, errors: Array) -> None:
         """Take out of all steps what odometry does wrong (3,) at each, which was known less well on the way."""
-        for number, drive in self._drives.items():
+        for number, driven in self._driven.items():
             step = self.steps[number]
-            change = effects(step.pose) @ (errors - drive.taken)
+            change = effects(step.pose) @ (errors - driven.taken)
             self.steps[number] = replace(step, pose=step.pose + change)
-            self.graph.amend(drive.edge, drive.share @ change)
-            self._drives[number] = drive._replace(taken=errors)
-        if self._drives:
+            self.graph.amend(driven.edge, driven.share @ change)
+            self._driven[number] = driven._replace(taken=errors)
+        if self._driven:
             self.graph.optimize(_SETTLED)
 
     def refine(self) -> Refined:
