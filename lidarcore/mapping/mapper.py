@@ -1,11 +1,13 @@
 """The map of a building from whole scans, live or from a recording."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lidarcore.arrays import Array
+from lidarcore.errors import LocalizationError
 from lidarcore.geometry import UncertainPose, compose, inverse, relative
+from lidarcore.mapping.between import Ties, covariances, kept
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Refined
 from lidarcore.mapping.loops.back import BackEnd
@@ -54,6 +56,7 @@ class Mapper:
         self._front, self._back = FrontEnd(self._settings.front), BackEnd(self._settings)
         self._stamps: list[float] = []
         self._ties: list[tuple[int, UncertainPose]] = []
+        self._driven: list[Array] = []  # covariances (3, 3) of the ties by motion alone
         self._motions: list[ScanMotion] = []
         self._numbers: list[int] = []
         self._locals: list[Array] = []  # T_local_keyframe, in the front end's frame
@@ -76,6 +79,7 @@ class Mapper:
         self._motions.append(_motion_of(tracked))
         self._stamps.append(tracked.stamp)
         self._ties.append(tie)
+        self._driven.append(tracked.moved.covariance)
         closed, self._loops = len(self._back.loops) - self._loops, len(self._back.loops)
         pose = compose(self._correction, local)
         return Placement(tracked.stamp, pose, tie[0], tracked.on, closed)
@@ -88,7 +92,11 @@ class Mapper:
         self._back.recalibrate(self._front.wheels)
         if self._back.search_again():
             self._back.search_again()
-        self._refined = self._back.refine()
+        refined = self._back.refine()
+        of_keyframes = [self._motions[number] for number in self._numbers]
+        scatter = np.array([motion.scatter for motion in of_keyframes])
+        share = kept(refined.poses, np.array(self._locals), scatter)
+        self._refined = replace(refined, sweeps=np.array([motion.stands(share) for motion in of_keyframes]))
         self._loops = len(self._back.loops)
 
     def _smooth_motion(self) -> None:
@@ -106,6 +114,18 @@ class Mapper:
                 P = tie.covariance - self._motions[number].sweep + after[number].sweep
                 self._ties[number] = node, UncertainPose(relative(self._locals[node], at[number]), P)
         self._motions = after
+
+    @property
+    def here(self) -> UncertainPose:
+        """T_map_sensor of the newest scan in the map as it grows; once that is finished, see `covariances`.
+
+        Raises LocalizationError if there is no scan.
+        """
+        if not self._ties:
+            raise LocalizationError("The map has no scan yet: give it one first.")
+        node, tie = self._ties[-1]
+        covariance = self._back.graph.covariance(node) if node else np.zeros((3, 3))
+        return UncertainPose(self._back.graph.poses[node], covariance).compose(tie)
 
     @property
     def loops(self) -> tuple[Loop, ...]:
@@ -134,12 +154,24 @@ class Mapper:
 
     def covariances(self) -> Array:
         """(T, 3, 3) of the poses that `trajectory` gives."""
-        found = self.keyframes
-        placed = [
-            UncertainPose(found.poses[node], found.covariances[node]).compose(tie).covariance
-            for node, tie in self._ties
-        ]
-        return np.array(placed).reshape(-1, 3, 3)
+        if self._refined is None:
+            found = self.keyframes
+            on = [UncertainPose(found.poses[node], found.covariances[node]) for node, _ in self._ties]
+            placed = [pose.compose(tie).covariance for pose, (_, tie) in zip(on, self._ties, strict=True)]
+            return np.array(placed).reshape(-1, 3, 3)
+        numbers, local = np.array(self._numbers, np.int64), np.array(self._locals)
+        return covariances(self._refined, local, numbers, self._all_ties())
+
+    def _all_ties(self) -> Ties:
+        """Of keyframes the tie is that to itself, but `matched` what it was found with."""
+        nodes = np.array([node for node, _ in self._ties], np.int64)
+        poses = np.array([tie.pose for _, tie in self._ties])
+        matched = np.array([np.diag(motion.variances) for motion in self._motions])
+        for number, (node, tie) in enumerate(self._ties):
+            if number != self._numbers[node]:
+                matched[number] = tie.covariance - self._motions[number].sweep
+        sweeps = np.array([motion.stands(1.0) for motion in self._motions])
+        return Ties(nodes, poses, matched, np.array(self._driven), sweeps)
 
     @property
     def _known(self) -> Refined | PoseGraph:
@@ -159,4 +191,7 @@ class Mapper:
 def _motion_of(tracked: Tracked) -> ScanMotion:
     variances = np.diagonal(tracked.tie.covariance - tracked.sweep)
     half, shift = half_time(tracked.scan), pose_shift(tracked.scan, tracked.patches)
-    return ScanMotion(half, tracked.velocity, np.zeros(3), variances, tracked.sweep, shift, tracked.on)
+    nothing = np.zeros((3, 3))
+    return ScanMotion(
+        half, tracked.velocity, np.zeros(3), variances, variances, tracked.sweep, nothing, shift, tracked.on
+    )

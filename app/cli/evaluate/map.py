@@ -70,6 +70,9 @@ def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
     """The figures, by what they are called."""
     import numpy as np
 
+    from lidarcore.evaluation.intervals import LEVEL
+    from lidarcore.geometry import chi_square_gate
+
     yield "scans", f"{judged.scans}, {judged.tracked} of them tracked; {judged.keyframes} keyframes"
     wrong = "" if judged.wrong is None else f", {judged.wrong} of them wrong"
     yield "loops", f"{judged.loops}{wrong}"
@@ -82,6 +85,9 @@ def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
             "normalised error",
             f"median {median:.2f}; {allowed:.2f} where the reference is allowed its own error (honest: 2.37)",
         )
+    if len(judged.live):
+        held = np.mean(judged.live <= chi_square_gate(LEVEL, 3))
+        yield "live poses", f"{held:.1%} inside the 95 % ellipsoids claimed when each came"
     found = judged.relations
     at_scans = found[found[:, 2] <= _AT_A_SCAN]
     if len(found):

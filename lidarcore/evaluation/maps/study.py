@@ -18,7 +18,13 @@ from lidarcore.evaluation.maps.accuracy import (
     relative_errors,
     with_poor_odometry,
 )
-from lidarcore.geometry import pose_difference, relative, relative_jacobians, squared_mahalanobis
+from lidarcore.geometry import (
+    UncertainPose,
+    pose_difference,
+    relative,
+    relative_jacobians,
+    squared_mahalanobis,
+)
 from lidarcore.mapping import Loop, Mapper, MapperSettings
 from lidarcore.mapping.grid.occupancy import Mask
 from lidarcore.scan import Scan
@@ -37,6 +43,8 @@ class MapStudy:
     pairs       (M,) m and rad errors (M, 2) of relative poses, within 3 m and more than 30 scans apart
     normalised  (S,) squared errors of pairs of keyframes in units of their claimed covariance, 3 dof
     allowed     (S,) the same, the reference being allowed its own error
+    live        (N,) squared errors of poses as each scan was placed when it came, seen from the first, in units of the
+                covariances claimed then, 3 dof
     relations   (R, 3) m and rad errors of relations verified by hand, and s from their stamps to the next scan
     of_reference
                 (R, 3) the same of the reference poses, (0, 3) without them
@@ -52,6 +60,7 @@ class MapStudy:
     pairs: Array
     normalised: Array
     allowed: Array
+    live: Array
     relations: Array
     of_reference: Array
 
@@ -91,18 +100,20 @@ def study(
     progress: Callable[[int], None] = lambda number: None,
 ) -> MapStudy:
     """Map the scans and judge the map. own is the standard deviation of the reference's poses themselves, m and rad."""
-    began, mapper, tracked = time.process_time(), Mapper(settings), 0
+    began, mapper, tracked, came = time.process_time(), Mapper(settings), 0, list[UncertainPose]()
     for number, scan in enumerate(scans, 1):
         tracked += mapper.step(scan).connected
+        came.append(mapper.here)
         progress(number)
     mapper.finish()
     seconds = time.process_time() - began
     stamps, poses = mapper.trajectory()
     numbers = mapper.keyframes.numbers
-    pairs, normalised, allowed, wrong = np.empty((0, 2)), np.empty(0), np.empty(0), None
+    pairs, normalised, allowed, live, wrong = np.empty((0, 2)), *np.empty((3, 0)), None
     if reference is not None:
         pairs = _lengths(relative_errors(poses, reference, close_pairs(reference)))
         normalised, allowed = _normalised(mapper, reference[numbers], own)
+        live = _squares(came[1:], relative(reference[0], reference[1:]))
         wrong = wrong_loops(mapper.loops, reference[numbers])
     found, theirs = np.empty((0, 3)), np.empty((0, 3))
     if relations is not None:
@@ -111,7 +122,7 @@ def study(
             theirs = relation_errors(relations, stamps, reference)
     return MapStudy(
         len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, _most_megabytes(),
-        pairs, normalised, allowed, found, theirs,
+        pairs, normalised, allowed, live, found, theirs,
     )  # fmt: skip
 
 
@@ -126,6 +137,12 @@ def _most_megabytes() -> float:
 
 def _lengths(errors: Array) -> Array:
     return np.stack([np.hypot(errors[:, 0], errors[:, 1]), np.abs(errors[:, 2])], -1)
+
+
+def _squares(poses: Sequence[UncertainPose], truth: Array) -> Array:
+    """Squared errors (N,) of poses in units of their covariances."""
+    off = pose_difference(np.array([pose.pose for pose in poses]).reshape(-1, 3), truth)
+    return squared_mahalanobis(off, np.array([pose.covariance for pose in poses]).reshape(-1, 3, 3))
 
 
 def _normalised(mapper: Mapper, reference: Array, own: tuple[float, float]) -> tuple[Array, Array]:

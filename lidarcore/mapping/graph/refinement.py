@@ -14,6 +14,8 @@ from scipy.sparse import csc_array, diags_array
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import (
     UncertainPose,
+    compose,
+    compose_jacobians,
     pose_difference,
     relative,
     relative_jacobians,
@@ -60,12 +62,23 @@ class Refined:
 
     def covariances(self) -> Array:
         """(K, 3, 3) of the poses as seen from the first: where that scan stands counts in all of them."""
-        own = _turned(self.sweeps, self.poses[:, 2])
-        own += self._recovery.diagonal()
-        A, B = relative_jacobians(self.poses[:1], self.poses)
-        # The first pose is fixed: the others share nothing with it but where its scan stands.
-        P: Array = A @ own[0] @ A.swapaxes(1, 2) + B @ own @ B.swapaxes(1, 2)
+        P = self.hung(np.arange(len(self.poses)), np.zeros(self.poses.shape), self.sweeps)
         P[0] = 0.0
+        return P
+
+    def hung(self, nodes: Ints, ties: Array, own: Array) -> Array:
+        """(T, 3, 3) of poses that hang on keyframes as seen from the first.
+
+        nodes (T,) are the keyframes, ties (T, 3) the poses seen from these, and own (T, 3, 3) the covariances that the
+        poses, seen from themselves, have beside what they share with their keyframes.
+        """
+        at = compose(self.poses[nodes], ties)
+        J, _ = compose_jacobians(self.poses[nodes], ties)
+        shared = J @ self._recovery.diagonal()[nodes] @ J.swapaxes(1, 2)
+        A, B = relative_jacobians(self.poses[:1], at)
+        first = A @ _turned(self.sweeps[0], self.poses[0, 2]) @ A.swapaxes(1, 2)
+        # The first pose is fixed: the others share nothing with it but where its scan stands.
+        P: Array = first + B @ (shared + _turned(own, at[:, 2])) @ B.swapaxes(1, 2)
         return P
 
     def relative(self, i: int, j: int) -> UncertainPose:

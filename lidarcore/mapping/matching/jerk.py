@@ -68,19 +68,26 @@ class Drive(NamedTuple):
         return cls(_NOISES[best], shares)
 
 
-def estimated(window: Window, drive: Drive) -> tuple[Array, Array]:
-    """Speeds and accelerations (T, 2, 3) with covariances (T, 3, 2, 2): each jerk counts as it explains the places."""
+def estimated(window: Window, drive: Drive) -> tuple[Array, Array, Array]:
+    """Speeds and accelerations (T, 2, 3) with covariances (T, 3, 2, 2): each jerk counts as it explains the places.
+
+    The third, (T, 2, 3), are their covariances with the error of the middle one of the places, by which they are told.
+    """
     fits = [_fit(window, drive.noise, jerk) for jerk in _JERKS]
-    evidences, rates, covariances = (np.stack(column) for column in zip(*fits, strict=True))
+    evidences, rates, covariances, gains = (np.stack(column) for column in zip(*fits, strict=True))
     shares = softmax(evidences + np.log(drive.shares)[:, None], axis=0)[..., None, None]
     mean = (shares * rates).sum(axis=0)
     off = rates - mean
-    return np.swapaxes(mean[..., 0], 1, 2).copy(), (shares * (covariances + off @ off.mT)).sum(axis=0)
+    middle = window.noise.shape[-1] // 2
+    error = drive.noise * window.noise[..., middle, middle]
+    shared = (shares * gains[..., middle : middle + 1]).sum(axis=0)[..., 0] * error[..., None]
+    speeds, with_place = (np.swapaxes(rows, 1, 2).copy() for rows in (mean[..., 0], shared))
+    return speeds, (shares * (covariances + off @ off.mT)).sum(axis=0), with_place
 
 
-def _fit(window: Window, noise: Array | float, jerk: Array) -> tuple[Array, Array, Array]:
+def _fit(window: Window, noise: Array | float, jerk: Array) -> tuple[Array, Array, Array, Array]:
     """Log evidence (T, 3) of `noise` (3,) times the variances and of a density (3,); speed and acceleration
-    (T, 3, 2, 1) with covariance (T, 3, 2, 2), if they are so.
+    (T, 3, 2, 1) with covariance (T, 3, 2, 2), if they are so, and what they take from each place (T, 3, 2, K).
     """
     A, y, P = window.basis, window.places, _USUAL[..., None] ** 2 * np.eye(3)
     N = np.reshape(noise, (-1, 1, 1)) * window.noise + (jerk**2)[:, None, None] * window.wander
@@ -89,7 +96,7 @@ def _fit(window: Window, noise: Array | float, jerk: Array) -> tuple[Array, Arra
     evidence = -0.5 * ((y.mT @ inverse @ y)[..., 0, 0] + np.linalg.slogdet(S)[1])
     gain = (P @ A.mT @ inverse)[..., 1:, :]
     left = np.eye(3)[1:] - gain @ A
-    return evidence, gain @ y, left @ P @ left.mT + gain @ N @ gain.mT
+    return evidence, gain @ y, left @ P @ left.mT + gain @ N @ gain.mT, gain
 
 
 def _wander(t: Array) -> Array:

@@ -25,7 +25,9 @@ class ScanMotion(NamedTuple):
     velocity      (3,) m/s, m/s, rad/s in the mean time of its beams that was taken out of it
     acceleration  (3,) m/s², m/s², rad/s², likewise
     variances     (3,) of the pose that it was placed at
+    scatter       (3,) of these, what differs from scan to scan
     sweep         (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
+    shared        (3, 3) covariance of that with the error of its place, from which its speed is told, too
     shift         (2, 3, 3) that make how far it is misplaced out of what of both was taken out too much
     on            whether what it saw says where
     """
@@ -34,9 +36,20 @@ class ScanMotion(NamedTuple):
     velocity: Array
     acceleration: Array
     variances: Array
+    scatter: Array
     sweep: Array
+    shared: Array
     shift: Array
     on: bool
+
+    def stands(self, kept: float) -> Array:
+        """`sweep` with what it adds to a pose that has `kept` of the error of the place, where that is more.
+
+        Places on either side of a scan tell its speed, but the first one's own place, wrong, makes its speed wrong.
+        """
+        values, V = np.linalg.eigh(self.shared + self.shared.T)
+        more: Array = self.sweep + kept * (V * np.maximum(values, 0.0)) @ V.T
+        return more
 
 
 def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Array, list[ScanMotion]]:
@@ -61,7 +74,8 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     for _ in range(_ROUNDS):
         places = relative(means[:, None], means[there])
         window = Window.of(told, since, h, places, variances[there])
-        rates, spread = estimated(window, Drive.of(window))
+        drive = Drive.of(window)
+        rates, spread, with_place = estimated(window, drive)
         rates[:, 1, :2] -= rates[:, 0, 2:] * left_of(rates[:, 0, :2])  # as the sensor has them, which turns
         shown = np.where(known[:, None, None], rates, removed)
         means = compose(laid, np.einsum("tijk,tik->tj", shift, shown - removed))
@@ -69,8 +83,17 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     # Of a pose, for each unit by which a speed and an acceleration are taken out too much.
     lever = shift - np.stack([h, -(h**2) / 3], 1)[..., None] * np.eye(3)
     sweeps = np.einsum("tijd,tdik,tkld->tjl", lever, spread, lever)
+    shared = np.einsum("tijd,tid->tjd", lever, with_place)
     after = [
-        one._replace(velocity=shown[k, 0], acceleration=shown[k, 1], sweep=sweeps[k]) if known[k] else one
+        one._replace(
+            velocity=shown[k, 0],
+            acceleration=shown[k, 1],
+            scatter=drive.noise * variances[k],
+            sweep=sweeps[k],
+            shared=shared[k],
+        )
+        if known[k]
+        else one
         for k, one in enumerate(motions)
     ]
     return now, after

@@ -20,6 +20,7 @@ Verdict = Literal["found", "too few points", "no fit", "several places"]
 _APART = (0.8, 0.35)  # m, rad: poses closer than both are one place
 _MOST_PLACES = 12  # where the points fit, from which on nothing tells them apart
 _CHANCE = 1 / 3  # share of a scan's points that fit at a place where it was not taken
+_SURE = 45.0  # log-likelihood ratio that the best of all wrong places reaches for one in 500 scans of another building
 _SIGMAS = 3.0  # of a guess, within which a pose is looked for
 _NEAR_LEVEL = 3  # of the squares in which it is, at least
 
@@ -80,7 +81,7 @@ class Relocator:
         found = self._best(
             query, angles, np.arange(len(angles)), LEVELS - 1, (0, 0, width, height), self.settings.against
         )
-        if found is not None and found.found and self._may_be_chance(found.fit, len(query.points)):
+        if found is not None and found.found and _evidence(found.fit, len(query.points)) < _SURE:
             return replace(found, verdict="too few points")
         return found or _nowhere("no fit")
 
@@ -152,10 +153,6 @@ class Relocator:
         return Relocation(
             verdict, *self._in_world(pose, covariance), best.fit, best.against, max(rivals, default=0.0)
         )
-
-    def _may_be_chance(self, fit: float, points: int) -> bool:
-        """Whether points that fit that well say less for a place than as many as are ever matched, if they just fit."""
-        return _evidence(fit, points) < _evidence(self.settings.fit, self.settings.most_points)
 
     def _as_guessed(self, query: Query, at: Array) -> Relocation:
         """How well a pose (3,) in cells of the field fits, which is not found."""

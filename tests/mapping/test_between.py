@@ -1,0 +1,92 @@
+"""Covariances of scans between keyframes: algebra in directions that are known, and robots whose truth is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lidarcore import SensorNoise
+from lidarcore.errors import LocalizationError
+from lidarcore.evaluation.maps.honesty import drive
+from lidarcore.geometry import pose_difference, relative, rotation, squared_mahalanobis
+from lidarcore.mapping import Mapper, MapperSettings
+from lidarcore.mapping.between import _reduced
+
+SETTINGS = MapperSettings().with_noise(SensorNoise(0.01, 0.001))
+
+
+def turned(angle: float, along: float, across: float, heading: float) -> np.ndarray:
+    """Covariance (3, 3) of these variances along a direction, across it and of the heading."""
+    C = np.diag([along, across, heading])
+    C[:2, :2] = rotation(angle) @ C[:2, :2] @ rotation(angle).T
+    return C
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, -2.0])
+def test_what_scans_tell_shrinks_and_what_motion_alone_tells_stays(angle):
+    """A corridor at an angle, along which scans say nothing; matched has what scans and motion tell."""
+    driven = turned(angle, 0.09, 0.04, 0.01)
+    by_scans = np.linalg.inv(turned(angle, 1e12, 1e-4, 1e-6))
+    matched = np.linalg.inv(np.linalg.inv(driven) + by_scans)
+    reduced = _reduced(matched[None], driven[None], 0.2)[0]
+    true = np.linalg.inv(np.linalg.inv(driven) + by_scans / 0.2)
+    np.testing.assert_allclose(reduced, true, rtol=1e-6, atol=1e-10)
+    np.testing.assert_allclose(_reduced(matched[None], driven[None], 1.0)[0], matched, rtol=1e-9, atol=1e-12)
+
+
+def test_a_pose_that_is_known_less_well_than_by_motion_stays_as_it_is():
+    """One that may be in either of two places, say."""
+    driven, matched = np.diag([0.01, 0.01, 0.01]), np.diag([4.0, 0.01, 0.01])
+    np.testing.assert_allclose(_reduced(matched[None], driven[None], 0.1)[0], matched, rtol=1e-9)
+
+
+@pytest.mark.parametrize("world", ["corridor", "furnished room"])
+def test_scans_between_keyframes_are_as_far_off_as_they_say(world):
+    """In units of what is claimed as far as their keyframes, with which they share most: within a quarter.
+
+    As if each scan had an error of its own beside its keyframe's, squares were half as large as claimed.
+    """
+    squares = {True: [], False: []}
+    for seed in range(8):
+        scans = drive(world, 8, seed)
+        mapper = Mapper(SETTINGS)
+        for scan in scans:
+            mapper.step(scan)
+        mapper.finish()
+        true = relative(scans[0].truth, np.array([scan.truth for scan in scans]))
+        P = mapper.covariances()
+        np.testing.assert_array_equal(P[0], 0)
+        np.testing.assert_allclose(P[mapper.keyframes.numbers], mapper.keyframes.covariances)
+        of_all = squared_mahalanobis(pose_difference(mapper.trajectory()[1], true)[1:], P[1:])
+        is_keyframe = np.isin(np.arange(1, len(scans)), mapper.keyframes.numbers)
+        for kind in squares:
+            squares[kind].append(of_all[is_keyframe == kind])
+    of_keyframes, of_others = (np.concatenate(squares[kind]) for kind in (True, False))
+    print(of_keyframes.mean() / 3, of_others.mean() / 3)
+    assert 0.75 < of_others.mean() / of_keyframes.mean() < 1.3
+
+
+def test_a_sensor_that_stands_has_one_keyframe_and_claims_what_each_scan_tells():
+    scans = drive("corridor", 0.5, 1)
+    still = [replace(scans[0], stamp=0.1 * k, odometry=np.zeros(3)) for k in range(4)]
+    mapper = Mapper(SETTINGS)
+    for scan in still:
+        mapper.step(scan)
+    before = mapper.covariances()
+    mapper.finish()
+    assert len(mapper.keyframes.poses) == 1
+    assert np.linalg.eigvalsh(mapper.covariances()[1:]).min() > 0
+    np.testing.assert_allclose(
+        np.diagonal(mapper.covariances()[1:], 0, 1, 2), np.diagonal(before[1:], 0, 1, 2), rtol=0.5
+    )
+
+
+def test_here_is_where_the_newest_scan_was_placed_and_a_map_without_scans_is_refused():
+    mapper = Mapper(SETTINGS)
+    with pytest.raises(LocalizationError, match="no scan yet"):
+        _ = mapper.here
+    for scan in drive("two rooms", 3, 2):
+        placed = mapper.step(scan)
+        np.testing.assert_allclose(mapper.here.pose, placed.pose, atol=1e-12)
+    np.testing.assert_allclose(mapper.here.covariance, mapper.covariances()[-1], rtol=1e-9)
+    assert len(mapper.keyframes.poses) > 3
