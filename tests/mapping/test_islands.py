@@ -81,21 +81,22 @@ def test_an_island_in_another_building_is_found_nowhere(around):
 @pytest.mark.long
 @pytest.mark.real_data
 def test_the_live_pose_is_lost_while_nobody_knows_how_an_island_lies(data):
-    scans = list(open_recording(data / "carmen_radish_corrected" / "freiburg-101-corrected.log.gz"))
+    """In the ACES building a scan after a break of 3.4 s without odometry fits in two places."""
+    scans = list(open_recording(data / "carmen_radish_corrected" / "aces-corrected.log.gz"))
     with closing(WholeScans()) as live:
-        states = [live.step(live.deskewed(scan)).state for scan in prepared(scans, "none", 0)[0][:40]]
-    assert states == 32 * ["tracking"] + 8 * ["lost"]
+        states = [live.step(live.deskewed(scan)).state for scan in prepared(scans, "none", 0)[0][:80]]
+    assert states == 70 * ["tracking"] + 10 * ["lost"]
 
 
 @pytest.mark.long
 @pytest.mark.real_data
-def test_a_real_building_without_odometry_where_a_scan_fits_in_two_places(data):
-    """In Freiburg's building 101 a scan after a break fits in two places, 6.8 m and half a turn from each other.
+def test_a_real_building_without_odometry_where_a_scan_fits_in_one_place_and_nearly_in_another(data):
+    """In Freiburg's building 101, after a break: half of the scan fits 6.8 m away, turned by nearly half a turn.
 
-    Taken for the wrong one, relative poses were 4.7 m off in the mean.
+    Taken for the wrong one, relative poses were 4.7 m off in the mean. Walls far ahead tell which is right.
     """
     scans = list(open_recording(data / "carmen_radish_corrected" / "freiburg-101-corrected.log.gz"))
     found = study(*prepared(scans, "none", 0), MapperSettings())
     assert found.wrong == 0
     assert found.pairs[:, 0].mean() < 0.045
-    assert found.tracked == found.scans - 1
+    assert found.tracked == found.scans

@@ -100,10 +100,13 @@ def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
 
 
 def _errors(off: "Array") -> str:
-    """Mean and largest of errors (M, 2 or more) m and rad."""
-    mean, worst = off.mean(axis=0), off.max(axis=0)
+    """Mean, median and largest of errors (M, 2 or more) m and rad."""
+    import numpy as np
+
+    mean, median, worst = off.mean(axis=0), np.median(off, axis=0), off.max(axis=0)
     return (
         f"mean {mean[0]:.4f} m, {degrees(mean[1]):.3f} degrees; "
+        f"median {median[0]:.4f} m, {degrees(median[1]):.3f} degrees; "
         f"largest {worst[0]:.3f} m, {degrees(worst[1]):.2f} degrees"
     )
 

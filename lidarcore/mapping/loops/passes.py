@@ -1,0 +1,94 @@
+"""Earlier passes of a place that a new keyframe may have come back to, and what was seen on them."""
+
+import numpy as np
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import relative
+from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.loops.consistency import spread
+from lidarcore.mapping.loops.keyframes import Keyframe
+from lidarcore.mapping.matching.patches import Patches, joined, placed
+from lidarcore.mapping.matching.sight import agreement
+from lidarcore.mapping.settings import VAGUE, LoopSettings
+
+_MARGIN = 0.3  # m by which surfaces may seem to be off where an overlap is guessed
+# A relative pose known this well (m, m, rad) gains nothing from a loop.
+_KNOWN = np.array([0.04, 0.04, 0.015])
+
+
+class Passes:
+    """Of the keyframes of a graph, by their nodes.
+
+    reach  m: a pose that three standard deviations leave farther open is too vague for its tie to be believed alone
+    """
+
+    def __init__(
+        self, graph: PoseGraph, keyframes: dict[int, Keyframe], settings: LoopSettings, reach: float
+    ) -> None:
+        self._graph, self._keyframes, self._settings, self._reach = graph, keyframes, settings, reach
+
+    def worth_a_match(self, k: int) -> list[tuple[int, Array]]:
+        """Earlier nodes to match node k with, and the covariance of k seen from there: the best of each pass nearby."""
+        settings, poses = self._settings, self._graph.poses
+        distances = np.hypot(*(poses[: max(k - settings.apart, 0), :2] - poses[k, :2]).T)
+        found = []
+        for run in map(self._kept, _runs(np.flatnonzero(distances < settings.farthest))):
+            if not len(run):
+                continue
+            closest = int(run[np.argmin(distances[run])])
+            P = self._graph.relative(closest, k)[1]
+            if P[2, 2] > VAGUE**2:
+                continue
+            radius = settings.distance + settings.sigmas * spread(P)
+            if distances[closest] > min(radius, settings.farthest) or (np.diagonal(P) < _KNOWN**2).all():
+                continue
+            best = self.best(run[distances[run] < min(radius, settings.farthest)], k, P)
+            if best is not None:
+                found.append((float(np.linalg.det(P)), best, P))
+        found.sort(key=lambda place: -place[0])
+        return [(i, P) for _, i, P in found[: settings.places]]
+
+    def best(self, nodes: Ints, k: int, P: Array) -> int | None:
+        """The node that saw most of what node k sees, or the nearest that saw enough; None if none did.
+
+        P (3, 3) is the covariance of node k seen from there.
+        """
+        nodes = self._kept(nodes)
+        if not len(nodes):
+            return None
+        poses, margin = self._graph.poses, _MARGIN + 2 * spread(P)
+        few = nodes[:: max(1, len(nodes) // 12)]
+        shares = [
+            agreement(
+                self._keyframes[i].sight, self._keyframes[k].sight, relative(poses[i], poses[k]), margin
+            )[0]
+            for i in few
+        ]
+        enough = np.array(shares) >= self._settings.overlap
+        if not enough.any():
+            return None
+        if not self.is_vague(P):
+            return int(few[np.argmax(shares)])
+        # Seen from where the graph is vague, shares tell little more than that.
+        distances = np.hypot(*(poses[few, :2] - poses[k, :2]).T)
+        return int(few[np.argmin(np.where(enough, distances, np.inf))])
+
+    def is_vague(self, P: Array) -> bool:
+        """Whether a pose with covariance P (3, 3) is known too little for its tie to be believed alone."""
+        return bool(3 * spread(P) >= self._reach)
+
+    def seen(self, around: int, nodes: range) -> Patches:
+        """What nodes saw together, seen from one of them."""
+        kept = self._kept(np.array(nodes))
+        poses = relative(self._graph.poses[around], self._graph.poses[kept])
+        return joined([placed(self._keyframes[n].patches.near, x) for n, x in zip(kept, poses, strict=True)])
+
+    def _kept(self, nodes: Ints) -> Ints:
+        """Those of the nodes whose scans are still there."""
+        there: Ints = nodes[np.array([n in self._keyframes for n in nodes.tolist()], bool)]
+        return there
+
+
+def _runs(nodes: Ints) -> list[Ints]:
+    """Successive numbers together, with small gaps."""
+    return [run for run in np.split(nodes, np.flatnonzero(np.diff(nodes) > 3) + 1) if len(run)]
