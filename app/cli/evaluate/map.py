@@ -85,9 +85,13 @@ def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
             "normalised error",
             f"median {median:.2f}; {allowed:.2f} where the reference is allowed its own error (honest: 2.37)",
         )
-    if len(judged.live):
-        held = np.mean(judged.live <= chi_square_gate(LEVEL, 3))
-        yield "live poses", f"{held:.1%} inside the 95 % ellipsoids claimed when each came"
+    held = [
+        f"{np.mean(squares <= chi_square_gate(LEVEL, 3)):.1%} by the {judge}"
+        for squares, judge in ((judged.live, "reference"), (judged.live_by_map, "finished map"))
+        if len(squares)
+    ]
+    if held:
+        yield "live poses", f"inside the 95 % ellipsoids claimed when each came: {', '.join(held)}"
     found = judged.relations
     at_scans = found[found[:, 2] <= _AT_A_SCAN]
     if len(found):

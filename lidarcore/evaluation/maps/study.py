@@ -43,8 +43,10 @@ class MapStudy:
     pairs       (M,) m and rad errors (M, 2) of relative poses, within 3 m and more than 30 scans apart
     normalised  (S,) squared errors of pairs of keyframes in units of their claimed covariance, 3 dof
     allowed     (S,) the same, the reference being allowed its own error
-    live        (N,) squared errors of poses as each scan was placed when it came, seen from the first, in units of the
-                covariances claimed then, 3 dof
+    live        (N,) squared errors of poses as each scan was placed when it came, by the reference, in units of the
+                covariances claimed then, 3 dof; seen from the first scan
+    live_by_map
+                (N,) the same by the finished map
     relations   (R, 3) m and rad errors of relations verified by hand, and s from their stamps to the next scan
     of_reference
                 (R, 3) the same of the reference poses, (0, 3) without them
@@ -61,6 +63,7 @@ class MapStudy:
     normalised: Array
     allowed: Array
     live: Array
+    live_by_map: Array
     relations: Array
     of_reference: Array
 
@@ -115,6 +118,7 @@ def study(
         normalised, allowed = _normalised(mapper, reference[numbers], own)
         live = _squares(came[1:], relative(reference[0], reference[1:]))
         wrong = wrong_loops(mapper.loops, reference[numbers])
+    by_map = _squares(came[1:], poses[1:])
     found, theirs = np.empty((0, 3)), np.empty((0, 3))
     if relations is not None:
         found = relation_errors(relations, stamps, poses)
@@ -122,7 +126,7 @@ def study(
             theirs = relation_errors(relations, stamps, reference)
     return MapStudy(
         len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, _most_megabytes(),
-        pairs, normalised, allowed, live, found, theirs,
+        pairs, normalised, allowed, live, by_map, found, theirs,
     )  # fmt: skip
 
 

@@ -20,7 +20,7 @@ Verdict = Literal["found", "too few points", "no fit", "several places"]
 _APART = (0.8, 0.35)  # m, rad: poses closer than both are one place
 _MOST_PLACES = 12  # where the points fit, from which on nothing tells them apart
 _CHANCE = 1 / 3  # share of a scan's points that fit at a place where it was not taken
-_SURE = 45.0  # log-likelihood ratio that the best of all wrong places reaches for one in 500 scans of another building
+_SURE = 40.0  # log-likelihood ratio that the best of all wrong places reaches for one in 130 scans of another building
 _SIGMAS = 3.0  # of a guess, within which a pose is looked for
 _NEAR_LEVEL = 3  # of the squares in which it is, at least
 
