@@ -46,3 +46,5 @@ def map_recording(
         f"{plural(len(built.mapper.keyframes.scans), 'keyframe')}, {plural(len(built.mapper.loops), 'loop')}; "
         f"{plural(len(walls), 'wall')}, {walls.length.sum():.0f} m."
     )
+    if built.left_out:
+        typer.echo(f"Left out: {plural(len(built.left_out), 'scan')}, the first of them {built.left_out[0]}.")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lidarcore.errors import MotionError
 from lidarcore.mapping import Mapper, MapperSettings
 from lidarcore.mapping.export import write_map
 from lidarcore.mapping.grid import build_grid
@@ -19,10 +20,11 @@ from .localization_run import COLUMNS
 
 @dataclass(frozen=True)
 class Built:
-    """A finished mapper, and "tracking" or "lost" for each scan."""
+    """A finished mapper, "tracking" or "lost" for each scan that it took, and why it left out the others."""
 
     mapper: Mapper
     states: list[str]
+    left_out: list[str]
 
 
 def mapper_settings(settings: Settings) -> MapperSettings:
@@ -32,12 +34,15 @@ def mapper_settings(settings: Settings) -> MapperSettings:
 
 def build(recording: Recording, settings: Settings, progress: Callable[[int], None]) -> Built:
     """Map a recording; `progress` is told the number of scans. Raises RecordingError."""
-    mapper, states = Mapper(mapper_settings(settings)), []
+    mapper, states, left_out = Mapper(mapper_settings(settings)), list[str](), list[str]()
     for number, scan in enumerate(recording, 1):
-        states.append("tracking" if mapper.step(scan).connected else "lost")
+        try:
+            states.append("tracking" if mapper.step(scan).connected else "lost")
+        except MotionError as error:
+            left_out.append(f"scan {number}: {str(error).partition(':')[0]}")
         progress(number)
     mapper.finish()
-    return Built(mapper, states)
+    return Built(mapper, states, left_out)
 
 
 def write_files(folder: Path, built: Built, settings: Settings) -> Walls:

@@ -4,6 +4,7 @@ from abc import abstractmethod
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Set
 from functools import partial
+from heapq import heappop, heappush
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -16,6 +17,11 @@ from lidarcore.scan import Array, Scan
 
 SICK_STEPS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
 """Degrees between the beams of a SICK LMS by their number (CARMEN, carmen_laser_guess_angle_increment)."""
+
+
+_MOST_LATE = (
+    100  # lines, and more are not a line that was written late: the clock was set, or logs were joined
+)
 
 
 class Reading(NamedTuple):
@@ -54,7 +60,7 @@ def sick_bearings(number: int) -> Array:
 
 
 class LaserLog(Recording):
-    """A text log with one line for each scan.
+    """A text log with one line for each scan, as they were taken: a logger may write some a few lines late.
 
     Opening reads the file once: for the lidars in it, the marker for no return and the quality of the stamps.
     """
@@ -65,6 +71,8 @@ class LaserLog(Recording):
     @abstractmethod
     def _parse(self, words: list[bytes]) -> Reading | None:
         """Read a line; None if it is not a laser's. Raises ValueError or IndexError if it is damaged."""
+
+    _late = 0  # lines by which one may stand too late in the file
 
     def _open(self, topic: str | None) -> None:
         surveys: defaultdict[str, Survey] = defaultdict(Survey)
@@ -120,7 +128,10 @@ class LaserLog(Recording):
             steps = np.diff(stamps)
             if np.isfinite(stamps).all() and stamps.any() and (len(steps) == 0 or np.median(steps) > 0):
                 if backward := int(np.sum(steps < 0)):
-                    self._remark(f"The stamps go back in time {backward} times.")
+                    self._late = _latest(stamps)
+                    often = "once" if backward == 1 else f"{backward} times"
+                    mended = ": scans are put in their order" if self._late else ""
+                    self._remark(f"The stamps go back in time {often}{mended}.")
                 return np.array(stamps, np.float64)
         self._remark(
             f"The stamps are zero or rounded: scans are taken in file order, {NOMINAL_PERIOD} s apart."
@@ -129,8 +140,19 @@ class LaserLog(Recording):
 
     def _scans(self) -> Iterator[Callable[[], Scan]]:
         chosen = (reading for reading in self._readings() if reading.topic == self.topic)
-        for reading, stamp in zip(chosen, self._stamps, strict=False):
-            yield partial(self._scan, reading, float(stamp))
+        waiting: list[
+            tuple[float, int, Reading]
+        ] = []  # with the numbers of their lines, as stamps may be the same
+        for number, (reading, stamp) in enumerate(zip(chosen, self._stamps, strict=False)):
+            heappush(waiting, (float(stamp), number, reading))
+            if len(waiting) > self._late:
+                yield self._first_of(waiting)
+        while waiting:
+            yield self._first_of(waiting)
+
+    def _first_of(self, waiting: list[tuple[float, int, Reading]]) -> Callable[[], Scan]:
+        stamp, _, reading = heappop(waiting)
+        return partial(self._scan, reading, stamp)
 
     def _scan(self, reading: Reading, stamp: float) -> Scan:
         missing = reading.ranges >= min(self._marker, reading.max_range)
@@ -150,3 +172,10 @@ class LaserLog(Recording):
     def _base_pose(self, reading: Reading, stamp: float) -> Array | None:
         """T_odom_base (3,) of a reading; that of the sensor where the log knows no robot."""
         return reading.pose
+
+
+def _latest(stamps: Array) -> int:
+    """How many lines too late the latest one stands among its stamps (N,); 0 if that is too many."""
+    places = np.argsort(stamps, kind="stable")
+    late = int(np.abs(places - np.arange(len(places))).max(initial=0))
+    return late if late <= _MOST_LATE else 0

@@ -122,3 +122,18 @@ def test_counts_that_no_recording_has_are_refused(words: tuple[str, ...]) -> Non
     result = CliRunner().invoke(cli, [*words, "99999999999999999999999"])
     assert result.exit_code == 2
     assert "less than or equal" in result.output
+
+
+def test_a_map_leaves_out_a_scan_whose_clock_went_back_and_says_so(drive: Path, tmp_path: Path) -> None:
+    with np.load(drive) as file:
+        held = dict(file)
+    held["stamps"][50] -= 5
+    broken = tmp_path / "broken.npz"
+    np.savez(broken, **held)
+    result = CliRunner().invoke(cli, ["map", str(broken), "-o", str(tmp_path / "map")])
+    assert result.exit_code == 0, result.output
+    assert "99 scans, 99 of them tracked" in result.output
+    assert re.search(
+        r"Left out: 1 scan, the first of them scan 51: The clock went back by 4\.\d+ s\.", result.output
+    )
+    assert len((tmp_path / "map" / "poses.csv").read_text().splitlines()) == 100

@@ -96,6 +96,29 @@ def test_bad_motion_is_told_and_leaves_everything_as_it_was():
     assert len(mapper.trajectory()[0]) == len(stamps) + 1
 
 
+@pytest.mark.parametrize("breaks", ["clock", "odometry", "both"])
+def test_a_map_goes_on_after_a_break_of_clock_or_odometry(breaks):
+    """The clock is set back by 100 s, or the wheels count from elsewhere: two scans are left out, the third goes on."""
+    scans = honesty.drive("two rooms", 8, seed=3)
+    mapper, refused, kept = Mapper(MapperSettings().with_noise(SensorNoise(0.01, 0.001))), [], []
+    for k, scan in enumerate(scans):
+        if k >= 40 and breaks != "odometry":
+            scan = replace(scan, stamp=scan.stamp - 100)
+        if k >= 40 and breaks != "clock":
+            scan = replace(scan, odometry=compose(np.array([50.0, -20.0, 1.0]), scan.odometry))
+        try:
+            assert mapper.step(scan).connected
+            kept.append(k)
+        except MotionError:
+            refused.append(k)
+    assert refused == [40, 41]
+    mapper.finish()
+    true = relative(scans[0].truth, np.array([scans[k].truth for k in kept]))
+    off = pose_difference(mapper.trajectory()[1], true)
+    assert np.hypot(*off[:, :2].T).max() < 0.02
+    assert np.abs(off[:, 2]).max() < 0.01
+
+
 def test_the_trajectory_has_every_scan_with_its_stamp():
     scans = drive(way(0.5, 0.2), np.random.default_rng(7))
     mapper = Mapper(SETTINGS)

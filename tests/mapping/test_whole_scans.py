@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -94,3 +95,19 @@ def test_the_map_goes_on_after_a_pause_in_which_the_robot_drove_on(
     assert last.state == "tracking"
     assert len(slam.path()) > 10  # not a map that has just begun
     assert np.hypot(*(last.estimate.pose - true_pose(drive, 329))[:2]) < 0.3
+
+
+def test_a_clock_that_is_set_back_costs_two_scans_and_not_the_map(
+    slam: WholeScans, drive: list[Scan]
+) -> None:
+    scans = drive[:60] + [replace(scan, stamp=scan.stamp - 100) for scan in drive[60:120]]
+    results = followed(slam, scans)
+    assert {result.state for result in results} == {"tracking"}
+    said = {k: str(result.message) for k, result in enumerate(results) if result.message}
+    assert sorted(said) == [60, 61, 62]
+    assert all("The clock went back by" in message for message in said.values())
+    assert "skipped" in said[60]
+    assert "continues" in said[62]
+    error = results[-1].estimate.pose - true_pose(drive, 119)
+    assert np.hypot(*error[:2]) < 0.1
+    assert len(slam.path()) > 15

@@ -16,7 +16,7 @@ from lidarcore.localization import Estimate, Landmarks, Points, TrackingResult, 
 from lidarcore.localization.dead_reckoning import DeadReckoning
 from lidarcore.localization.deskewing import Distortion
 from lidarcore.localization.ekf.estimate import Instant, no_innovation
-from lidarcore.localization.tracking_result import State, goes_on
+from lidarcore.localization.tracking_result import State, goes_on, left_out
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.live.background import Background, Corrected, MapPicture
 from lidarcore.mapping.live.locate_worker import LocateWorker
@@ -63,7 +63,15 @@ class WholeScans:
         self._settings = MapperSettings().with_noise(extraction.noise)
         self._distortion, self._reckoning = Distortion(), DeadReckoning()
         self._is_nowhere = False  # in a known map, as long as the pose was not found
-        self._begin()
+        self._state: State = "starting"
+        self._front = FrontEnd(self._settings.front)
+        self._background = self._begun()
+        # To each keyframe from the one before it, but for those that the map has already, so many.
+        self._ways, self._joined = deque[UncertainPose](), 0
+        self._tie = _HERE  # T_keyframe_sensor
+        self._here: UncertainPose | None = None
+        self._before: float | None = None  # stamp of the last scan
+        self._velocity: Velocity | None = None
 
     @property
     def deskewed_by(self) -> tuple[float, Velocity]:
@@ -106,20 +114,23 @@ class WholeScans:
     def step(
         self, scan: Scan, features: Features | None = None, clusters: Clusters | None = None
     ) -> TrackingResult:
-        """Place a scan that `deskewed` gave. After a break of clock or odometry a new map begins."""
+        """Place a scan that `deskewed` gave; one before which clock or odometry broke off is left out, up to two."""
         try:
-            tracked, message = self._front.step(scan, self._removed(scan)), None
+            tracked = self._front.step(scan, self._removed(scan))
         except MotionError as error:
-            self.end()
-            self._begin()
-            tracked, message = self._front.step(scan, self._removed(scan)), goes_on(error)
+            assert self._here is not None  # the first scan has nothing to break off from
+            return self._result(scan.stamp, self._state, left_out(error), self._here)
+        message = None if self._front.bridged is None else goes_on(self._front.bridged)
+        if message:
+            self._reckoning.interrupt()
+            self._before = None
         self._move(scan, tracked)
         here = self._located(tracked)
         self._reckoning.carry(Instant(scan.stamp, scan.odometry), here.pose)
         state, why = self._background.judge(tracked, here)
         if self._is_nowhere and state != "starting":  # found: odometry is compared from here on
             self._reckoning.place(here.pose)
-        self._is_nowhere = state == "starting"
+        self._is_nowhere, self._state = state == "starting", state
         return self._result(tracked.stamp, state, message or why, here)
 
     def _removed(self, scan: Scan) -> Array:
@@ -134,17 +145,6 @@ class WholeScans:
     def close(self) -> None:
         """End, and wait for what runs in the background."""
         self._background.close()
-
-    def _begin(self) -> None:
-        self._front = FrontEnd(self._settings.front)
-        self._background = self._begun()
-        # To each keyframe from the one before it, but for those that the map has already, so many.
-        self._ways, self._joined = deque[UncertainPose](), 0
-        self._tie = _HERE  # T_keyframe_sensor
-        self._here: UncertainPose | None = None
-        self._is_nowhere = False
-        self._before: float | None = None  # stamp of the last scan
-        self._velocity: Velocity | None = None
 
     def _begun(self) -> Background:
         if self._known is not None:

@@ -19,6 +19,11 @@ _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 _FLOOR = np.diag([0.01, 0.01, 0.005]) ** 2  # what a step is never known better than: the search needs room
 _SLOW = 0.1  # weight of the last scan in the usual time between two
 _ROUNDS = 4  # in which the motion in the first two scans is found: what is left of it halves at least
+_AGREEING = (
+    3  # scans in a row, of which the last one is believed though clock or odometry break off before them
+)
+_HIDDEN = 2.0  # s that such a break hides of the way, at least
+_LONGEST = 10.0  # and at most: after that nothing is known
 _BAD = 0.4  # share of a scan on the map below which it is a keyframe, as it shows what is new
 
 
@@ -32,6 +37,8 @@ class FrontEnd:
         self._known = self._moved = _HERE  # T_keyframe_scan, and by motion alone
         self._before: tuple[float, Array | None] | None = None  # stamp and odometry
         self._first: Tracked | None = None  # until the second keyframe
+        self._refused = 0  # scans in a row
+        self.bridged: MotionError | None = None  # the break before the last scan, over which the map goes on
         self._sweep = Sweep()
         self._wheels = OdometryCalibration()
         self._motion, self._period = np.zeros(3), 0.0  # s between scans, as stamps of single scans jitter
@@ -39,7 +46,8 @@ class FrontEnd:
     def step(self, scan: Scan, removed: Array | None = None) -> Tracked:
         """Place a scan; removed (3,) m/s, m/s, rad/s is the motion that was taken out of it already.
 
-        Raises MotionError if the clock went back or odometry jumped; nothing has changed then.
+        Raises MotionError if the clock went back or odometry jumped, and the scan is left out. The third one in a row
+        is believed: clock and odometry go on from there, and what the scan sees tells how the sensor moved meanwhile.
         """
         if self._before is None:
             seen = patches(scan, self._settings.match)
@@ -50,7 +58,7 @@ class FrontEnd:
                 scan.stamp, 0, _HERE, _HERE, None, True, scan, seen, NOTHING, given, True, False
             )
             return self._first
-        dt, driven = self._since(scan)
+        dt, driven = self._across(scan)
         if self._first is not None and self._before[0] == self._first.stamp:
             self._first = self._straightened(self._first, scan, removed, driven, dt)
             dt, driven = self._since(scan)
@@ -137,6 +145,22 @@ class FrontEnd:
         self._map.add(seen, tie)
         self._known = self._moved = _HERE
         self._number += 1
+
+    def _across(self, scan: Scan) -> tuple[float, UncertainPose]:
+        """As `_since`, but that breaks of clock or odometry end with the third scan that they would leave out."""
+        self.bridged = None
+        try:
+            since = self._since(scan)
+        except MotionError as error:
+            self._refused += 1
+            if self._refused < _AGREEING:
+                raise
+            assert self._before is not None
+            hidden = min(max(abs(scan.stamp - self._before[0]), _HIDDEN), _LONGEST)
+            self.bridged, self._before = error, (scan.stamp - hidden, None)
+            since = self._since(scan)
+        self._refused = 0
+        return since
 
     def _since(self, scan: Scan) -> tuple[float, UncertainPose]:
         """Seconds since the last scan, and the motion: by odometry, else as before."""
