@@ -85,7 +85,9 @@ def serving(tmp_path: Path) -> Iterator[Callable[..., Serving]]:
     started: list[Serving] = []
 
     def start(*arguments: object, **options: Any) -> Serving:
-        started.append(Serving(*arguments, "--recordings", tmp_path / "recordings", **options))
+        started.append(
+            Serving("--http-port", 0, *arguments, "--recordings", tmp_path / "recordings", **options)
+        )
         return started[-1]
 
     yield start
