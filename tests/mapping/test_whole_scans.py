@@ -111,3 +111,13 @@ def test_a_clock_that_is_set_back_costs_two_scans_and_not_the_map(
     error = results[-1].estimate.pose - true_pose(drive, 119)
     assert np.hypot(*error[:2]) < 0.1
     assert len(slam.path()) > 15
+
+
+def test_walls_catch_up_when_no_more_scans_come(slam: WholeScans, drive: list[Scan]) -> None:
+    followed(slam, drive[:150])
+
+    def is_complete() -> bool:
+        walls = None if slam.picture is None else slam.picture.walls
+        return walls is not None and bool(walls.last_seen.max() >= drive[130].stamp)
+
+    wait_until(is_complete)

@@ -54,6 +54,7 @@ class MapWorker(Background):
         self._begin_grid(GridSettings(most_cells=_MOST_CELLS))
         self._wall_ids = WallIds()
         self._next_picture = self._next_walls = 0.0
+        self._walled = 0  # nodes that the walls know
         self._failures = FailureLog("the map could not be brought up to date")
         self._worker = Worker(self._work, "map", idle=_EVERY)
 
@@ -74,8 +75,9 @@ class MapWorker(Background):
     def _step(self, tracked: Tracked | None, waiting: int) -> None:
         if tracked is not None:
             self._add(tracked)
-        lacks = self._back.keyframes and len(self._drawn) < len(self._back.graph)
-        if lacks and time.monotonic() >= self._next_picture:
+        now, known = time.monotonic(), len(self._back.graph) if self._back.keyframes else 0
+        lacks = len(self._drawn) < known or (self._walled < known and now >= self._next_walls)
+        if lacks and now >= self._next_picture:
             self._draw()
 
     def _add(self, tracked: Tracked) -> None:
@@ -100,6 +102,7 @@ class MapWorker(Background):
         begin = time.monotonic()
         if begin >= self._next_walls:
             self.picture = MapPicture(grid, walls := self._walls(grid))
+            self._walled = len(self._back.graph)
             if self._keep:
                 self._keep(grid, walls)
             end = time.monotonic()
