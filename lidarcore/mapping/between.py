@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import pose_difference, relative, rotation
-from lidarcore.mapping.graph.refinement import Refined
+from lidarcore.geometry import pose_difference, relative
+from lidarcore.mapping.graph.refinement import Refined, turned
 
 _LARGEST = 9.0  # a squared normalised difference counts no more: a keyframe may be found elsewhere after all
 
@@ -43,9 +43,8 @@ def covariances(refined: Refined, local: Array, numbers: Ints, ties: Ties) -> Ar
     nodes, poses, own = ties.nodes.copy(), ties.poses.copy(), ties.sweeps.copy()
     share = _replaced(refined.poses, local, np.diagonal(ties.matched[numbers], axis1=1, axis2=2))
     own[numbers] = refined.sweeps
-    own[is_between] += _seen_by_scans(
-        _reduced(ties.matched[is_between], ties.driven[is_between], share), poses[is_between, 2]
-    )
+    reduced = _reduced(ties.matched[is_between], ties.driven[is_between], share)
+    own[is_between] += turned(reduced, -poses[is_between, 2])  # seen from the scans
     if len(numbers) > 1:
         # Seen from itself the first keyframe has no error that others could share; with the second they share both's.
         first = is_between & (nodes == 0)
@@ -83,11 +82,3 @@ def _reduced(matched: Array, driven: Array, share: float) -> Array:
     scanned = np.maximum(1 / values - 1, 0.0)  # information by scans, in units of that by motion
     reduced: Array = L @ (V * np.where(scanned > 0, 1 / (scanned / share + 1), values)[:, None]) @ V.mT @ L.mT
     return reduced
-
-
-def _seen_by_scans(covariances: Array, headings: Array) -> Array:
-    """Covariances (T, 3, 3) seen from keyframes, seen from scans with headings (T,) there."""
-    R = np.zeros(covariances.shape)
-    R[:, :2, :2], R[:, 2, 2] = rotation(headings), 1.0
-    seen: Array = R.mT @ covariances @ R
-    return seen

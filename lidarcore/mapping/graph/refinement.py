@@ -76,9 +76,9 @@ class Refined:
         J, _ = compose_jacobians(self.poses[nodes], ties)
         shared = J @ self._recovery.diagonal()[nodes] @ J.swapaxes(1, 2)
         A, B = relative_jacobians(self.poses[:1], at)
-        first = A @ _turned(self.sweeps[0], self.poses[0, 2]) @ A.swapaxes(1, 2)
+        first = A @ turned(self.sweeps[0], self.poses[0, 2]) @ A.swapaxes(1, 2)
         # The first pose is fixed: the others share nothing with it but where its scan stands.
-        P: Array = first + B @ (shared + _turned(own, at[:, 2])) @ B.swapaxes(1, 2)
+        P: Array = first + B @ (shared + turned(own, at[:, 2])) @ B.swapaxes(1, 2)
         return P
 
     def relative(self, i: int, j: int) -> UncertainPose:
@@ -89,7 +89,7 @@ class Refined:
 
     def _own(self, i: int) -> Array:
         """Covariance (3, 3) of pose i itself."""
-        block: Array = self._recovery.block(i, i) + _turned(self.sweeps[i], self.poses[i, 2])
+        block: Array = self._recovery.block(i, i) + turned(self.sweeps[i], self.poses[i, 2])
         return block
 
 
@@ -178,9 +178,9 @@ def _measured(groups: Groups, cells: int, keyframes: int) -> tuple[float, float]
     return float(scale), float(np.sqrt(shared))
 
 
-def _turned(covariances: Array, headings: Array) -> Array:
+def turned(covariances: Array, headings: Array) -> Array:
     """Covariances (..., 3, 3) of poses, seen from poses with these headings (...,) themselves, in the map."""
     R = np.zeros(covariances.shape)
     R[..., :2, :2], R[..., 2, 2] = rotation(headings), 1.0
-    turned: Array = R @ covariances @ R.swapaxes(-1, -2)
-    return turned
+    seen: Array = R @ covariances @ R.swapaxes(-1, -2)
+    return seen
