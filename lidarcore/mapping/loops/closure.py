@@ -76,7 +76,7 @@ class LoopFinder:
 
     def _seen(self, k: int, before: int) -> Patches:
         """What node k and so many before it saw together, seen from node k."""
-        return self._passes.seen(k, range(max(0, k - before), k + 1))
+        return self._passes.seen(k, np.arange(max(0, k - before), k + 1))
 
     def _agreeing(self, k: int) -> list[Loop]:
         """The waiting loops that fit each other, if they reach far enough and no rivals do; they wait no more."""

@@ -2,17 +2,17 @@
 
 import numpy as np
 
-from lidarcore.arrays import Array
-from lidarcore.geometry import chi_square_gate, relative
+from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import UncertainPose, chi_square_gate, compose, relative, wrap
 from lidarcore.mapping.graph.pose_graph import PoseGraph
-from lidarcore.mapping.loops.consistency import Loop, squared
+from lidarcore.mapping.loops.consistency import Loop, spread, squared
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.loops.passes import Passes
 from lidarcore.mapping.matching.correlative import search
 from lidarcore.mapping.matching.patches import Patches
-from lidarcore.mapping.matching.registration import Registration, information_of, register
+from lidarcore.mapping.matching.registration import information_of, register
 from lidarcore.mapping.matching.sight import agreement
-from lidarcore.mapping.matching.surfels import Surfels, surfels
+from lidarcore.mapping.matching.surfels import surfels
 from lidarcore.mapping.settings import LoopSettings, MatchSettings
 
 CAUTION = 4.0
@@ -20,9 +20,12 @@ CAUTION = 4.0
 _CONFLICT = 0.2  # m by which a point must lie before a surface to contradict it
 # The guess takes part with this many times its covariance, lest it is counted twice in the graph.
 _WIDEN = 9.0
-# A guess from the graph is never taken to be better than this: the search needs room.
+# A guess from the graph is never taken to be better than this: the search has to move.
 _FLOOR = np.diag([0.05, 0.05, 0.02]) ** 2
-_RIVAL = 0.85  # of a match's quality, from which on another place is a rival
+_RIVAL = 0.85  # of the best match's quality, from which on another place is a rival
+_SIGMAS = 3  # to either side, up to which places of a pass are sought
+_APART = 0.5  # m at least between two places of a pass
+_PLACES = 6  # of a pass, at most, that one node is matched with
 
 
 class Hypotheses:
@@ -41,53 +44,63 @@ class Hypotheses:
         self._gate = float(chi_square_gate(loops.gate, 3))
 
     def at(self, i: int, k: int, P: Array, seen: Patches, gated: bool = True) -> list[Loop]:
-        """Where node k may be, seen from around node i: the best place, and its rival if that is nearly as good.
+        """Where node k may be, on the pass of node i: the best place, and its rivals if they are nearly as good.
 
-        P (3, 3) is the covariance of node k seen from node i, `seen` what was seen around it. Neither place may be
-        where the graph does not expect it, if `gated`.
+        P (3, 3) is the covariance of node k seen from node i, `seen` what was seen around it. No place may be where
+        the graph does not expect it, if `gated`.
         """
-        half = self._settings.before
-        earlier = self._passes.seen(i, range(max(0, i - half), min(i + half + 1, k - self._settings.apart)))
-        reference = surfels(earlier, self._match.patch, self._match.reach)
-        mean = relative(self._graph.poses[i], self._graph.poses[k])
+        cautious, is_vague = _cautious(P), self._passes.is_vague(P)
+        far = _SIGMAS * spread(cautious)
+        nodes = self._passes.around(i, k, far)
+        found: list[Loop] = []
+        for start in self._starts(i, k, cautious, nodes, seen, 1 + int(far / _APART) if is_vague else 1):
+            place = compose(self._graph.poses[i], start)
+            n = self._passes.best_at(nodes if is_vague else np.array([i]), k, place)
+            loop = None if n is None else self._tied(n, k, place, seen, gated)
+            if loop is not None and not any(self._is_same(loop, other) for other in found):
+                found.append(loop)
+        best = max((loop.quality for loop in found), default=0.0)
+        return [loop for loop in found if loop.quality >= _RIVAL * best]
 
-        def best(besides: Array) -> Loop | None:
-            loop = self._registered(i, k, mean, P, reference, seen, besides)
-            return loop if loop is None or not gated or self._is_expected(loop, mean, P) else None
+    def _starts(self, i: int, k: int, P: Array, nodes: Ints, seen: Patches, room: int) -> Array:
+        """Up to `room` T_i_k (S, 3) within P (3, 3) at which what was seen fits the nodes of a pass, best first.
 
-        first = best(np.empty((0, 3)))
-        if first is None:
-            return []
-        if not self._passes.is_vague(P):
-            return [first]
-        second = best(first.pose[None])
-        if second is None or second.quality < _RIVAL * first.quality or self._same(first, second):
-            return [first]
-        return [first, second]
+        The whole pass is searched at once: on a part of it, what was seen overlaps most where the graph expects it,
+        and in a corridor whose doors are all alike that place would always win.
+        """
+        reference = self._passes.seen(i, nodes).means
+        mean, sigma = relative(self._graph.poses[i], self._graph.poses[k]), np.sqrt(np.diagonal(P))
+        starts = np.empty((0, 3))
+        for _ in range(min(room, _PLACES)):
+            start = search(reference, seen.means, mean, sigma, self._match, starts)
+            starts = np.concatenate([starts, start[None]])
+        return starts
 
-    def _registered(
-        self, i: int, k: int, mean: Array, P: Array, reference: Surfels, seen: Patches, besides: Array
-    ) -> Loop | None:
-        """The best place besides others; None if it does not fit."""
-        P = CAUTION * P + _FLOOR
-        prior, match = information_of(_WIDEN * P), self._match
-        start = search(reference.means, seen.means, mean, np.sqrt(np.diagonal(P)), match, besides)
-        registered: Registration = register(reference, seen, start, mean, prior, match.reach)
+    def _tied(self, i: int, k: int, place: Array, seen: Patches, gated: bool) -> Loop | None:
+        """Node k, taken to be at a place (3,), registered on what was seen around node i; None if it does not fit."""
+        mean, P = self._graph.relative(i, k)
+        half, match, start = self._settings.before, self._match, relative(self._graph.poses[i], place)
+        around = np.arange(max(0, i - half), min(i + half + 1, k - self._settings.apart))
+        reference = surfels(self._passes.seen(i, around), match.patch, match.reach)
+        start[2] = mean[2] + wrap(start[2] - mean[2])
+        prior = information_of(_WIDEN * _cautious(P))
+        registered = register(reference, seen, start, mean, prior, match.reach)
         if registered.inliers < self._settings.inliers:
+            return None
+        C = information_of(registered.information) + self._settings.floor
+        if gated and squared(registered.pose, mean, C + _cautious(P)) > self._gate:
             return None
         conflicts = self._conflicts(i, k, registered.pose)
         if conflicts > self._settings.conflicts:
             return None
-        C = information_of(registered.information) + self._settings.floor
         return Loop(i, k, registered.pose, C, registered.inliers - conflicts)
 
-    def _is_expected(self, loop: Loop, mean: Array, P: Array) -> bool:
-        """Whether a loop lies in the gate of where the graph has it: mean (3,) with covariance P (3, 3)."""
-        return squared(loop.pose, mean, loop.covariance + CAUTION * P + _FLOOR) <= self._gate
-
-    def _same(self, a: Loop, b: Loop) -> bool:
-        """True if two poses are one, known only vaguely (along a corridor)."""
-        return squared(a.pose, b.pose, a.covariance + b.covariance) < self._gate
+    def _is_same(self, a: Loop, b: Loop) -> bool:
+        """True if two places are one, known only vaguely (along a corridor)."""
+        poses = self._graph.poses
+        apart = UncertainPose(relative(poses[a.i], poses[b.i]), np.zeros((3, 3)))
+        pose, P = apart.compose(UncertainPose(b.pose, b.covariance))
+        return squared(a.pose, pose, a.covariance + P) < self._gate
 
     def _conflicts(self, i: int, k: int, pose: Array) -> float:
         """Largest share of either scan that lies where the other one looked through."""
@@ -97,3 +110,8 @@ class Hypotheses:
             agreement(b, a, relative(pose, np.zeros(3)), _CONFLICT),
         )
         return max(there[1], back[1])
+
+
+def _cautious(P: Array) -> Array:
+    """What is taken for the covariance (3, 3) of a pose that the graph knows within P."""
+    return CAUTION * P + _FLOOR

@@ -53,18 +53,9 @@ class Passes:
 
         P (3, 3) is the covariance of node k seen from there.
         """
-        nodes = self._kept(nodes)
-        if not len(nodes):
-            return None
-        poses, margin = self._graph.poses, _MARGIN + 2 * spread(P)
-        few = nodes[:: max(1, len(nodes) // 12)]
-        shares = [
-            agreement(
-                self._keyframes[i].sight, self._keyframes[k].sight, relative(poses[i], poses[k]), margin
-            )[0]
-            for i in few
-        ]
-        enough = np.array(shares) >= self._settings.overlap
+        poses = self._graph.poses
+        few, shares = self._shares(nodes, k, poses[k], _MARGIN + 2 * spread(P))
+        enough = shares >= self._settings.overlap
         if not enough.any():
             return None
         if not self.is_vague(P):
@@ -73,13 +64,35 @@ class Passes:
         distances = np.hypot(*(poses[few, :2] - poses[k, :2]).T)
         return int(few[np.argmin(np.where(enough, distances, np.inf))])
 
+    def best_at(self, nodes: Ints, k: int, place: Array) -> int | None:
+        """The node near a place (3,) that saw most of what node k would see from there; None if none saw enough."""
+        near = np.hypot(*(self._graph.poses[nodes, :2] - place[:2]).T) < self._settings.distance
+        few, shares = self._shares(nodes[near], k, place, _MARGIN)
+        return int(few[np.argmax(shares)]) if shares.max(initial=0.0) >= self._settings.overlap else None
+
+    def _shares(self, nodes: Ints, k: int, place: Array, margin: float) -> tuple[Ints, Array]:
+        """A dozen of the nodes, and the share that each of them saw of what node k sees from a place (3,)."""
+        nodes = self._kept(nodes)
+        few, poses, sight = nodes[:: max(1, len(nodes) // 12)], self._graph.poses, self._keyframes[k].sight
+        shares = [
+            agreement(self._keyframes[i].sight, sight, relative(poses[i], place), margin)[0] for i in few
+        ]
+        return few, np.array(shares)
+
     def is_vague(self, P: Array) -> bool:
         """Whether a pose with covariance P (3, 3) is known too little for its tie to be believed alone."""
         return bool(3 * spread(P) >= self._reach)
 
-    def seen(self, around: int, nodes: range) -> Patches:
+    def around(self, i: int, k: int, far: float) -> Ints:
+        """Nodes of the pass of node i, before node k, up to `far` m from it, and its neighbours."""
+        half, poses = self._settings.before, self._graph.poses[: k - self._settings.apart]
+        near = np.hypot(*(poses[:, :2] - poses[i, :2]).T) < far
+        near[max(0, i - half) : i + half + 1] = True
+        return next(run for run in _runs(np.flatnonzero(near)) if i in run)
+
+    def seen(self, around: int, nodes: Ints) -> Patches:
         """What nodes saw together, seen from one of them."""
-        kept = self._kept(np.array(nodes))
+        kept = self._kept(nodes)
         poses = relative(self._graph.poses[around], self._graph.poses[kept])
         return joined([placed(self._keyframes[n].patches.near, x) for n, x in zip(kept, poses, strict=True)])
 

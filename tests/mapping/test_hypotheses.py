@@ -1,0 +1,81 @@
+"""Where a node may be on an earlier pass: its true place, however far from there the graph expects it, and rivals."""
+
+import numpy as np
+import pytest
+
+from lidarcore.geometry import compose, relative
+from lidarcore.mapping import LoopSettings, PoseGraph
+from lidarcore.mapping.loops.hypotheses import Hypotheses
+from lidarcore.mapping.loops.keyframes import Keyframe
+from lidarcore.mapping.loops.passes import Passes
+from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.matching.sight import sight
+from lidarcore.simulation import World
+from tests.mapping.mapping_scenes import NOISE, SETTINGS, sick_scan
+
+MATCH, LOOPS = SETTINGS.front.match, LoopSettings()
+PITCH = 2.4  # m between doors, all of them alike
+HERE = np.array([24.0, 0.1, 0.0])  # where the newest node is
+BEFORE = 4
+
+
+def side(y, deep):
+    """A wall along a corridor, with a recess of 0.9 m for each door."""
+    points = [[0.0, y]]
+    for x in np.arange(1.0, 46.0, PITCH):
+        points += [[x, y], [x, y + deep], [x + 0.9, y + deep], [x + 0.9, y]]
+    points.append([48.0, y])
+    return np.stack([points[:-1], points[1:]], axis=1)
+
+
+def box(x, y, side=0.5):
+    corners = np.array([[x, y], [x + side, y], [x + side, y + side], [x, y + side], [x, y]])
+    return np.stack([corners[:-1], corners[1:]], axis=1)
+
+
+CORRIDOR = World(np.concatenate([side(-1.2, -0.25), side(1.2, 0.25)]))
+FURNISHED = World(np.concatenate([CORRIDOR.walls, box(22.6, 0.7), box(25.4, -1.2), box(27.0, 0.7)]))
+
+
+def newest_on_first(world, off):
+    """A pass along a corridor, and a few nodes of a second one that the graph has `off` m too far along."""
+    rng = np.random.default_rng(3)
+    first = np.stack([np.arange(6.0, 42.0, 0.5), np.zeros(72), np.zeros(72)], -1)
+    second = HERE + np.stack([np.arange(-BEFORE, 1) * 0.5, np.zeros(5), np.zeros(5)], -1)
+    truth = np.concatenate([first, second])
+    graph = PoseGraph(first[0])
+    for k in range(1, len(truth)):
+        step, tight = relative(truth[k - 1], truth[k]), np.diag([0.01, 0.01, 0.002]) ** 2
+        if k == len(first):
+            step, tight = step + np.array([off, 0.0, 0.0]), np.diag([2.5, 0.3, 0.03]) ** 2
+        graph.connect(k - 1, graph.add(compose(graph.poses[k - 1], step)), step, tight)
+    keyframes = {}
+    for k, pose in enumerate(truth):
+        scan = sick_scan(world, pose, NOISE, rng)
+        keyframes[k] = Keyframe(scan, patches(scan, MATCH), sight(scan), np.zeros((3, 3)))
+    return truth, graph, keyframes
+
+
+def places(world, off):
+    """Metres along the corridor by which each place that is found is off; the best one first."""
+    truth, graph, keyframes = newest_on_first(world, off)
+    passes, k = Passes(graph, keyframes, LOOPS, MATCH.reach), len(truth) - 1
+    hypotheses = Hypotheses(graph, keyframes, passes, LOOPS, MATCH)
+    ((i, P),) = passes.worth_a_match(k)
+    found = hypotheses.at(i, k, P, passes.seen(k, np.arange(k - BEFORE, k + 1)))
+    found.sort(key=lambda loop: -loop.quality)
+    return np.array([(compose(truth[loop.i], loop.pose) - truth[k])[0] for loop in found])
+
+
+@pytest.mark.parametrize("off", [-4.9, 0.0, 4.9])
+def test_the_true_place_is_found_wherever_the_graph_expects_it(off):
+    assert np.abs(places(FURNISHED, off)).min() < 0.1
+
+
+@pytest.mark.parametrize("off", [-4.9, 4.9])
+def test_doors_that_are_alike_are_rivals_of_each_other(off):
+    """Nothing tells one door from the next, so that none may be believed alone; all of them lie a door apart."""
+    found = places(CORRIDOR, off)
+    assert len(found) >= 3
+    np.testing.assert_allclose(found / PITCH, np.round(found / PITCH), atol=0.05)
+    assert len(set(np.round(found / PITCH))) == len(found)
