@@ -20,6 +20,7 @@ from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
 
+_SEARCHES = 2  # for passes that no loop ties: the first may bring others near enough
 _HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 
 
@@ -92,6 +93,9 @@ class Mapper:
         self._back.recalibrate(self._front.wheels)
         if self._back.search_again():
             self._back.search_again()
+        for _ in range(_SEARCHES):
+            if not self._back.search_beside():
+                break
         refined = self._back.refine()
         of_keyframes = [self._motions[number] for number in self._numbers]
         scatter = np.array([motion.scatter for motion in of_keyframes])

@@ -14,6 +14,7 @@ from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import rotate
 from lidarcore.mapping.cells import cells
 from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells
+from lidarcore.mapping.graph.known import Known, parted
 
 _GAP = 0.15  # m between two surfaces side by side
 _BEYOND = 1e6  # m between two islands
@@ -32,15 +33,22 @@ class NormalEquations(NamedTuple):
 
 
 def normal_equations(
-    seen: Observations, poses: Array, islands: Ints, size: float, scale: float, unevenness: float
+    seen: Observations,
+    poses: Array,
+    islands: Ints,
+    size: float,
+    scale: float,
+    unevenness: float,
+    known: Known | None = None,
 ) -> tuple[NormalEquations, int]:
     """The normal equations at poses (K, 3), and how many cells were seen by several keyframes of one island (K,).
 
     The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
+    Cells are parted where parts of the way are not known, seen from each other.
     """
     arms, normals = (rotate(poses[seen.keyframes, 2], v) for v in (seen.means, seen.normals))
     places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
-    order, starts = _ordered(places, normals, size, seen.keyframes)
+    order, starts = _ordered(places, normals, size, seen.keyframes, known)
     turned = Observations(
         seen.keyframes[order], arms[order], normals[order], seen.variances[order], seen.near[order]
     )
@@ -52,10 +60,15 @@ def normal_equations(
     return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups))), shared
 
 
-def _ordered(places: Array, normals: Array, size: float, keyframes: Ints) -> tuple[Ints, Ints]:
+def _ordered(
+    places: Array, normals: Array, size: float, keyframes: Ints, known: Known | None
+) -> tuple[Ints, Ints]:
     """Order of patches by cell and keyframe, and where each cell begins, with the end."""
     number = cells(places, normals, size, _GAP)
     order = np.lexsort([keyframes, number])
+    if known is not None:
+        number[order] = parted(number[order], known.part[keyframes[order]], known.pairs)
+        order = np.lexsort([keyframes, number])
     return order, np.append(np.flatnonzero(np.diff(number[order], prepend=-1)), len(order))
 
 

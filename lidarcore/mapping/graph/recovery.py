@@ -7,6 +7,8 @@ from scipy.sparse.linalg import SuperLU, splu
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
 
+_KEPT = 3_000_000  # rows of three columns each: 72 MB
+
 
 class Recovery:
     """Blocks (3, 3) of the joint covariance of N nodes, by their information H (3 N, 3 N).
@@ -63,6 +65,8 @@ class Recovery:
 
     def _column(self, j: int) -> Array:
         if j not in self._columns:
+            if len(self._columns) * self._factor.shape[0] > _KEPT:
+                self._columns.clear()
             self._columns[j] = self._solved(j)
         return self._columns[j]
 

@@ -27,6 +27,7 @@ from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.graph.adjustment import NormalEquations, normal_equations
 from lidarcore.mapping.graph.adjustment_cells import Groups, Observations
+from lidarcore.mapping.graph.known import Known
 from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.matching.patches import Patches
 
@@ -101,6 +102,7 @@ def refine(
     islands: Ints | None = None,
     sweeps: Array | None = None,
     assumed: float = 0.0,
+    known: Known | None = None,
     rounds: int = 12,
 ) -> Refined:
     """Adjust poses (K, 3) that are right to about a cell's `size` m; the first one stays.
@@ -108,6 +110,7 @@ def refine(
     islands (K,) number what each pose is right to: surfaces seen from different islands are different ones.
     sweeps (K, 3, 3) are covariances of where each scan stands beside its pose; they move nothing.
     assumed m is the unevenness that the patches' variances contain: it is measured here, and would count twice.
+    known tells which parts of the way may be taken to have seen the same surfaces; None: all.
     steps tie keyframes by odometry or the going on of the motion: what is known where surfaces say nothing.
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
@@ -115,7 +118,7 @@ def refine(
     seen = _observations(scans, assumed**2)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
-        equations, cells = normal_equations(seen, poses, islands, size, scale, unevenness)
+        equations, cells = normal_equations(seen, poses, islands, size, scale, unevenness, known)
         H, g = _with_steps(equations, poses, steps)
         step = factor(H).solve(-g).reshape(-1, 3)
         poses = poses + step
@@ -123,7 +126,7 @@ def refine(
         scale, unevenness = _measured(equations.groups, cells, len(poses))
         if np.abs(step).max() < _SETTLED:
             break
-    equations, _ = normal_equations(seen, poses, islands, size, scale, unevenness)
+    equations, _ = normal_equations(seen, poses, islands, size, scale, unevenness, known)
     return Refined(
         poses, sweeps, scale, unevenness, Recovery(factor(_with_steps(equations, poses, steps)[0]))
     )

@@ -8,6 +8,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.geometry import compose, pose_difference, relative, squared_mahalanobis
 from lidarcore.mapping.doubt import DOUBTFUL
+from lidarcore.mapping.graph.known import Known, known, near_unknown
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Refined, Step, refine
 from lidarcore.mapping.loops.closure import LoopFinder
@@ -109,23 +110,45 @@ class BackEnd:
         if self._driven:
             self.graph.optimize(_SETTLED)
 
+    def search_beside(self) -> int:
+        """Look for loops where passes come near each other that no loop ties. Returns how many were closed.
+
+        Surfaces say far more of where a pass leads than its keyframes' ties do, as long as those of two passes that are
+        not known, seen from each other, are not taken for the same ones. What that leaves open may be little enough to
+        tell one door of a corridor from the next.
+        """
+        parts = known(self.graph, self._settings.front.match.reach)
+        nodes = near_unknown(self.graph, parts, self._settings.loops.farthest)
+        if not len(nodes):
+            return 0
+        refined = self._refined(parts)
+        finder = LoopFinder(refined, self.keyframes, self._settings.loops, self._settings.front.match)
+        loops = [loop for node in nodes.tolist() for loop in finder.find(node)]
+        loops += finder.conclude()
+        if loops:
+            self.graph.move(refined.poses)
+        return self._close(loops)
+
     def refine(self) -> Refined:
         """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""
         self.graph.optimize()
-        scans = [keyframe.patches for keyframe in self.keyframes.values()]
-        sweeps = np.array([keyframe.sweep for keyframe in self.keyframes.values()])
-        refined = refine(
-            scans,
+        refined = self._refined()
+        self.graph.move(refined.poses)
+        self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
+        return refined
+
+    def _refined(self, parts: Known | None = None) -> Refined:
+        match, sweeps = self._settings.front.match, [keyframe.sweep for keyframe in self.keyframes.values()]
+        return refine(
+            [keyframe.patches for keyframe in self.keyframes.values()],
             self.graph.poses,
             self.steps,
             self._settings.cell,
             self._islands.numbers,
-            sweeps,
-            self._settings.front.match.unevenness,
+            np.array(sweeps),
+            match.unevenness,
+            parts,
         )
-        self.graph.move(refined.poses)
-        self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
-        return refined
 
     def _join(self, k: int) -> int:
         """Move the newest island to where node k of it was found. Returns how many loops tie it there: 0 or 1."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import chi_square_gate
-from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.graph.known import JointPoses
 from lidarcore.mapping.loops.consistency import Consistency, Loop, spread, squared, support
 from lidarcore.mapping.loops.hypotheses import CAUTION, Hypotheses
 from lidarcore.mapping.loops.keyframes import Keyframe
@@ -25,7 +25,7 @@ class LoopFinder:
     """Ties nodes of a graph to earlier ones."""
 
     def __init__(
-        self, graph: PoseGraph, keyframes: dict[int, Keyframe], loops: LoopSettings, match: MatchSettings
+        self, graph: JointPoses, keyframes: dict[int, Keyframe], loops: LoopSettings, match: MatchSettings
     ) -> None:
         self._graph, self._settings, self._farthest = graph, loops, match.max_shift
         self._passes = Passes(graph, keyframes, loops, match.reach)

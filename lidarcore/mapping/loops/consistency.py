@@ -9,7 +9,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.geometry import UncertainPose, kernels, pose_difference, squared_mahalanobis
-from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.graph.known import JointPoses
 
 # Share of the spread with which a loop was expected, up to which the way around tells whether it is true.
 _TELLING = 0.5
@@ -33,7 +33,7 @@ class Loop:
 class Consistency:
     """Which loops agree with each other, by what a graph says between two of its changes."""
 
-    def __init__(self, graph: PoseGraph, gate: float) -> None:
+    def __init__(self, graph: JointPoses, gate: float) -> None:
         """`gate` is the largest squared Mahalanobis distance of two ways that end at one place."""
         self._relative, self._gate = cache(graph.relative), gate
         self._known: dict[tuple[Loop, Loop], bool] = {}

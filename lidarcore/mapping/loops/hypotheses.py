@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import UncertainPose, chi_square_gate, compose, relative, wrap
-from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.graph.known import JointPoses
 from lidarcore.mapping.loops.consistency import Loop, spread, squared
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.loops.passes import Passes
@@ -33,7 +33,7 @@ class Hypotheses:
 
     def __init__(
         self,
-        graph: PoseGraph,
+        graph: JointPoses,
         keyframes: dict[int, Keyframe],
         passes: Passes,
         loops: LoopSettings,

@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import relative
-from lidarcore.mapping.graph.pose_graph import PoseGraph
+from lidarcore.mapping.graph.known import JointPoses
 from lidarcore.mapping.loops.consistency import spread
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.matching.patches import Patches, joined, placed
@@ -23,7 +23,7 @@ class Passes:
     """
 
     def __init__(
-        self, graph: PoseGraph, keyframes: dict[int, Keyframe], settings: LoopSettings, reach: float
+        self, graph: JointPoses, keyframes: dict[int, Keyframe], settings: LoopSettings, reach: float
     ) -> None:
         self._graph, self._keyframes, self._settings, self._reach = graph, keyframes, settings, reach
 

@@ -1,0 +1,83 @@
+"""Which parts of a way are known, seen from each other, so well that a surface seen from both is one.
+
+Where a graph is vaguer than surfaces lie apart, those of two passes that seem to coincide need not be the same.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from lidarcore.arrays import Array, Bools, Ints
+from lidarcore.compiled import kernel
+from lidarcore.geometry import UncertainPose
+
+_TOGETHER = 16  # successive keyframes that are judged as one part of the way
+
+
+class JointPoses(Protocol):
+    """Poses that are known together: a pose graph, or what was adjusted."""
+
+    @property
+    def poses(self) -> Array:
+        """(K, 3) of keyframes: m, m, rad."""
+
+    def relative(self, i: int, j: int) -> UncertainPose:
+        """T_i_j (3,) and its covariance (3, 3)."""
+
+
+class Known(NamedTuple):
+    """Which parts of a way are known, seen from each other.
+
+    part   (K,) number of the part that each keyframe is of
+    pairs  (S, S) of the parts
+    """
+
+    part: Ints
+    pairs: Bools
+
+
+def known(joint: JointPoses, within: float) -> Known:
+    """The parts of a way; two are known if the place of one, seen from the other, has a deviation below `within` m."""
+    part = np.arange(len(joint.poses)) // _TOGETHER
+    middles = np.minimum(np.arange(part[-1] + 1) * _TOGETHER + _TOGETHER // 2, len(part) - 1).tolist()
+    pairs = np.eye(len(middles), k=-1, dtype=bool) | np.eye(len(middles), dtype=bool)
+    for b, j in enumerate(middles):
+        for a, i in enumerate(middles[: max(0, b - 1)]):
+            P = joint.relative(i, j)[1]
+            pairs[b, a] = P[0, 0] + P[1, 1] < within**2
+    return Known(part, pairs | pairs.T)
+
+
+def near_unknown(joint: JointPoses, known: Known, distance: float) -> Ints:
+    """Keyframes within a distance in m of earlier ones that are not known, seen from there."""
+    places, part, found = joint.poses[:, :2], known.part, []
+    for k, place in enumerate(places):
+        others = places[:k][~known.pairs[part[k], part[:k]]]
+        if (np.hypot(*(others - place).T) < distance).any():
+            found.append(k)
+    return np.array(found, np.int64)
+
+
+@kernel
+def parted(cells: Ints, parts: Ints, pairs: Bools) -> Ints:
+    """Cells (M,) parted so that none holds what was seen from parts (M,) of the way that no known pairs connect.
+
+    Both come in the order of the cells, and of the parts in each; the cells of the answer are numbered from 0.
+    """
+    found = np.empty(len(cells), np.int64)
+    number, low = -1, 0
+    for i in range(len(cells)):
+        if i == 0 or cells[i] != cells[i - 1]:
+            low = i
+        elif parts[i] == parts[i - 1]:
+            found[i] = found[i - 1]
+            continue
+        found[i] = -1
+        for j in range(low, i):
+            if pairs[parts[j], parts[i]]:
+                found[i] = found[j]
+                break
+        if found[i] < 0:
+            number += 1
+            found[i] = number
+    return found

@@ -1,0 +1,125 @@
+"""What a graph knows of parts of a way seen from each other, and loops where passes come near that none ties."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lidarcore.evaluation.maps.accuracy import with_poor_odometry
+from lidarcore.geometry import compose, relative
+from lidarcore.mapping import Mapper, PoseGraph
+from lidarcore.mapping.graph.known import Known, known, near_unknown, parted
+from lidarcore.simulation import World
+from tests.mapping.mapping_scenes import NOISE, SETTINGS, sick_scan
+
+STEP = np.diag([0.02, 0.02, 0.004]) ** 2
+LENGTH, DEPTH, WIDE, PITCH = 52.0, 16.0, 2.4, 3.0
+
+
+def chain(nodes):
+    """A straight way in steps of half a metre."""
+    graph = PoseGraph()
+    for k in range(1, nodes):
+        graph.connect(k - 1, graph.add([0.5 * k, 0, 0]), [0.5, 0, 0], STEP)
+    return graph
+
+
+def test_parts_are_known_as_far_as_the_graph_says():
+    graph = chain(160)
+    found = known(graph, 0.5)
+    middles = np.arange(10) * 16 + 8
+    for a, i in enumerate(middles):
+        for b, j in enumerate(middles):
+            P = graph.relative(int(i), int(j))[1]
+            assert found.pairs[a, b] == (np.sqrt(P[0, 0] + P[1, 1]) < 0.5)
+    assert not found.pairs[0, 9]
+    assert (found.part == np.arange(160) // 16).all()
+
+
+def test_keyframes_near_others_that_are_not_known_from_there_are_found():
+    """A way out and back beside itself, whose ends are far apart along the way."""
+    graph = chain(160)
+    poses = graph.poses
+    poses[80:] = np.stack([poses[79::-1, 0], np.ones(80), np.full(80, np.pi)], -1)
+    graph.move(poses)
+    pairs = np.ones((10, 10), bool)
+    pairs[0, 9] = pairs[9, 0] = False
+    found = near_unknown(graph, Known(np.arange(160) // 16, pairs), 2.0)
+    assert (found == np.arange(144, 160)).all()
+
+
+def test_a_loop_makes_the_way_home_known():
+    graph = chain(160)
+    assert not known(graph, 1.0).pairs[0, 9]
+    graph.connect(0, 159, relative(graph.poses[0], graph.poses[159]), STEP, doubted=True)
+    graph.optimize()
+    assert known(graph, 1.0).pairs[0, 9]
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_no_cell_holds_what_parts_saw_that_nothing_connects(seed):
+    """Against connected components: within one cell, all parts joined directly or through each other in order."""
+    rng = np.random.default_rng(seed)
+    cells = np.sort(rng.integers(0, 5, 40))
+    parts = rng.integers(0, 6, 40)
+    order = np.lexsort([parts, cells])
+    cells, parts = cells[order], parts[order]
+    pairs = rng.random((6, 6)) < 0.4
+    pairs = pairs | pairs.T | np.eye(6, dtype=bool)
+    found = parted(cells, parts, pairs)
+    for number in np.unique(found):
+        mine = found == number
+        assert len(np.unique(cells[mine])) == 1
+        members = np.unique(parts[mine])
+        for k, part in enumerate(members[1:], 1):
+            assert pairs[members[:k], part].any()
+    for cell in np.unique(cells):  # a part is alone only if no earlier one is known from it
+        mine = cells == cell
+        for part in np.unique(parts[mine]):
+            assert len(np.unique(found[mine & (parts == part)])) == 1
+            earlier = np.unique(parts[mine & (parts < part)])
+            if pairs[earlier, part].any():
+                assert set(found[mine & (parts == part)]) <= set(found[mine & (parts < part)])
+
+
+def sides():
+    """Walls of a rectangular corridor; a recess for a door every three metres, all alike."""
+    walls = []
+    for x0, x1, y, deep in (
+        (0.0, LENGTH, 0.0, -0.25), (WIDE, LENGTH - WIDE, WIDE, 0.25),
+        (WIDE, LENGTH - WIDE, DEPTH, -0.25), (0.0, LENGTH, DEPTH + WIDE, 0.25),
+    ):  # fmt: skip
+        points = [[x0, y]]
+        for x in np.arange(PITCH, LENGTH - PITCH, PITCH):
+            points += [[x, y], [x, y + deep], [x + 0.9, y + deep], [x + 0.9, y]]
+        points.append([x1, y])
+        walls.append(np.stack([points[:-1], points[1:]], axis=1))
+    ends = [[0, 0, 0, DEPTH + WIDE], [LENGTH, 0, LENGTH, DEPTH + WIDE]]
+    ends += [[WIDE, WIDE, WIDE, DEPTH], [LENGTH - WIDE, WIDE, LENGTH - WIDE, DEPTH]]
+    return np.concatenate([*walls, np.reshape(ends, (-1, 2, 2))])
+
+
+def around():
+    """Poses (T, 3) half a metre apart: once around, and 15 m of the first corridor again."""
+    x0, x1, y0, y1 = WIDE / 2, LENGTH - WIDE / 2, WIDE / 2, DEPTH + WIDE / 2
+    corners = np.array([[10.0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0], [26.0, y0]])
+    lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    along = np.arange(0, lengths[-1], 0.5)
+    x, y = (
+        np.convolve(np.pad(np.interp(along, lengths, column), 2, mode="edge"), np.full(5, 0.2), "valid")
+        for column in corners.T
+    )
+    return np.stack([x, y, np.unwrap(np.arctan2(np.gradient(y), np.gradient(x)))], -1)
+
+
+def test_a_corridor_of_equal_doors_is_closed_once_surfaces_say_where_it_leads():
+    rng = np.random.default_rng(5)
+    poses, world = around(), World(sides())
+    scans = [sick_scan(world, pose, NOISE, rng) for pose in poses]
+    mapper = Mapper(SETTINGS)
+    for scan in with_poor_odometry(scans, poses, 1):
+        mapper.step(scan)
+    mapper.finish()
+    _, found = mapper.trajectory()
+    off = compose(poses[0], found[-1]) - poses[-1]
+    assert np.hypot(off[0], off[1]) < 0.1
+    assert mapper.loops
