@@ -5,7 +5,7 @@ import pytest
 
 from lidarcore import Scan, SensorNoise
 from lidarcore.errors import GridError
-from lidarcore.mapping.grid import FREE, OCCUPIED, GridBuilder, GridSettings, build_grid
+from lidarcore.mapping.grid import FREE, OCCUPIED, GridBuilder, GridSettings, OccupancyGrid, build_grid
 from lidarcore.simulation import SimulatedSensor, World
 from lidarcore.simulation.rooms import rectangular_room
 
@@ -113,3 +113,19 @@ def test_a_scan_without_returns_says_nothing():
     builder.add(Scan([np.nan, np.inf], [0.0, 0.1]), np.zeros(3))
     with pytest.raises(GridError, match="empty"):
         builder.grid()
+
+
+def test_larger_cells_hold_what_stands_in_any_and_else_what_is_free_in_any():
+    rng = np.random.default_rng(4)
+    cells = rng.choice([-1, -1, 0, 10, 50, 70, 100], (7, 11), p=[0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05])
+    grid = OccupancyGrid(cells, 0.05, np.array([1.0, 2.0, 0.3]))
+    coarse = grid.coarser(3)
+    assert coarse.resolution == pytest.approx(0.15)
+    assert coarse.cells.shape == (3, 4)
+    assert (coarse.origin == grid.origin).all()
+    for row in range(3):
+        for column in range(4):
+            block = cells[3 * row : 3 * row + 3, 3 * column : 3 * column + 3]
+            known = block[block >= 0]
+            expected = -1 if not len(known) else known.max() if known.max() >= 65 else known.min()
+            assert coarse.cells[row, column] == expected

@@ -10,7 +10,7 @@ from lidarcore import Scan, SensorNoise
 from lidarcore.errors import LocalizationError
 from lidarcore.geometry import UncertainPose, compose, pose_difference
 from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, write_ros_map
-from lidarcore.mapping.relocation import Relocator, query_of
+from lidarcore.mapping.relocation import Relocator, field, query_of
 from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
 from lidarcore.mapping.relocation.search import Turned, best_pose, contradicted, fit_at, squares
 from lidarcore.simulation import SimulatedSensor, World, furnished_room, random_pose
@@ -123,6 +123,21 @@ def test_keyframes_together_are_laid_as_they_lie_to_each_other():
     found = Relocator(furnished()).find(query_of(scans, elsewhere))
     assert found.found
     assert np.abs(pose_difference(found.pose, poses[-1])).max() < 0.08
+
+
+def test_maps_too_large_to_be_searched_at_once_are_searched_in_larger_cells(monkeypatch):
+    monkeypatch.setattr(field, "_MOST_CELLS", 50_000)
+    own, rng = furnished(), np.random.default_rng(7)
+    assert field.searchable(own).resolution >= 2 * own.resolution
+    relocator = Relocator(own)
+    found = []
+    for k in range(10):
+        pose = random_pose(furnished_room(), rng)
+        place = relocator.find(query_of([scan_at(furnished_room(), pose, 100 + k)]))
+        if place.found:
+            found.append(pose_difference(place.pose, pose))
+    assert len(found) >= 6
+    assert np.hypot(*np.array(found)[:, :2].T).max() < 0.15
 
 
 def test_too_few_points_and_empty_maps_say_so():

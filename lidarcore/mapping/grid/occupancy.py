@@ -65,6 +65,15 @@ class OccupancyGrid:
         """(H, W) true where nothing stands."""
         return (self.cells >= 0) & (self.cells <= FREE_UP_TO)
 
+    def coarser(self, times: int) -> "OccupancyGrid":
+        """The same in cells `times` as large: occupied if something stands in one, else free if one is."""
+        short = -np.array(self.cells.shape) % times
+        cells = np.pad(self.cells, [(0, short[0]), (0, short[1])], constant_values=UNKNOWN)
+        blocks = cells.reshape(cells.shape[0] // times, times, cells.shape[1] // times, times)
+        most, least = blocks.max(axis=(1, 3)), np.where(blocks < 0, OCCUPIED, blocks).min(axis=(1, 3))
+        merged = np.where((most >= 0) & (most < OCCUPIED_FROM), least, most)
+        return OccupancyGrid(merged, self.resolution * times, self.origin)
+
     def in_cells(self, xy: Array) -> Array:
         """Columns and rows (N, 2), with fractions, of points (N, 2) m in the world, from the grid's first corner."""
         return act_inverse(self.origin, xy) / self.resolution

@@ -37,17 +37,26 @@ class Field(NamedTuple):
     corner: Ints
 
 
-def make_field(grid: OccupancyGrid, reach: float) -> Field:
-    """The field of a grid. Raises LocalizationError if nothing in it is occupied or it is too large."""
+def searchable(grid: OccupancyGrid) -> OccupancyGrid:
+    """The grid, or the same in larger cells if its walls lie within too many to be searched at once.
+
+    Raises LocalizationError if nothing in it is occupied.
+    """
     rows, columns = np.nonzero(grid.occupied)
     if not len(rows):
         raise LocalizationError("Nothing is occupied in this map: there is nothing to find a place by.")
+    height, width = int(np.ptp(rows)) + 1, int(np.ptp(columns)) + 1
+    times = 1
+    while (height // times + 2 * _MARGIN + 2) * (width // times + 2 * _MARGIN + 2) > _MOST_CELLS:
+        times += 1
+    return grid.coarser(times) if times > 1 else grid
+
+
+def make_field(grid: OccupancyGrid, reach: float) -> Field:
+    """The field of a grid in which something is occupied."""
+    rows, columns = np.nonzero(grid.occupied)
     low = np.array([columns.min(), rows.min()]) - _MARGIN
     shape = np.array([rows.max(), columns.max()]) + 1 + _MARGIN - low[::-1]
-    if shape.prod() > _MOST_CELLS:
-        raise LocalizationError(
-            f"The map's walls lie within {shape[1]} x {shape[0]} cells, more than {_MOST_CELLS}: use a coarser map."
-        )
     occupied, free = (_part(mask, low, shape) for mask in (grid.occupied, grid.free))
     distance = distance_transform_edt(~occupied) * grid.resolution
     fit = np.rint(FULL * np.exp(-((distance / reach) ** 2) / 2)).astype(np.uint8)

@@ -9,7 +9,7 @@ from scipy.special import rel_entr
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import UncertainPose, act, compose, largest_variance, relative, rotate, rotation, wrap
 from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field
+from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field, searchable
 from lidarcore.mapping.relocation.query import Query
 from lidarcore.mapping.relocation.refine import refined
 from lidarcore.mapping.relocation.search import Turned, best_pose, contradicted, fit_at, squares
@@ -65,12 +65,15 @@ def _worth(place: _Place) -> float:
 class Relocator:
     """Finds poses in one map. Making it takes a moment; it may be asked from several threads.
 
-    Raises LocalizationError if the map has nothing to go by or is too large.
+    A map of more than some 200 m by 200 m in cells of 5 cm is searched in larger ones, and poses are known less well.
+
+    Raises LocalizationError if the map has nothing to go by.
     """
 
     def __init__(self, grid: OccupancyGrid, settings: RelocationSettings | None = None) -> None:
         self.settings = settings or RelocationSettings()
-        self._grid, self._field = grid, make_field(grid, self.settings.reach)
+        self._grid = searchable(grid)
+        self._field = make_field(self._grid, self.settings.reach)
 
     def find(self, query: Query) -> Relocation:
         """Where the last scan of a query was taken."""
