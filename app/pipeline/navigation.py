@@ -224,7 +224,8 @@ class Navigation:
             return None
         try:
             navigator = self._navigator_in(session, settings)
-            own_frame = self._store.is_built(session)
+            # The truth of a recording has a frame of its own, whatever map is used.
+            own_frame = self._store.is_built(session) or timed.position.kind == "recording"
         except LandmarkMapError as error:  # deleted meanwhile, or the file cannot be read
             self.problem = str(error)
             return None

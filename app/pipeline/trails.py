@@ -60,7 +60,8 @@ NO_PATHS = Paths(*(np.empty((0, 2)) for _ in range(3)))
 class Trails:
     """The ways of one run, and its trajectory.
 
-    A map that SLAM built has a frame of its own, in which the truth is placed by where the sensor is seen first.
+    A map that SLAM built has a frame of its own, and so has the truth of a recording: there the truth is placed by
+    where the sensor is seen first.
     """
 
     def __init__(self, own_frame: bool) -> None:

@@ -65,7 +65,7 @@ async function list() {
 }
 
 function draw({ sessions, store }, { session, mode }, landmarks) {
-  const built = mode === "slam" ? sessions.find(({ ended }) => ended === null)?.id : undefined;
+  const built = mode === "slam" ? store.session : undefined; // one whose server was killed has no end either
   const live = { session, landmarks: landmarks.size, built };
   remake($("map-list"), [sessions, store.error, live], () => rows(sessions, store, live));
 }

@@ -13,6 +13,8 @@ from lidarcore_app.scene.palette import PALETTE
 from playwright.sync_api import Browser, Locator, expect
 from waiting import wait_until
 
+from lidarcore.landmarks import Atlas
+
 ROBOT = {"kind": "simulation", "settings": {"world": "two rooms", "seed": 3}}
 WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
 MANY, OFTEN = 6, 8  # walls, and keyframes that saw each
@@ -21,8 +23,12 @@ Wall = dict[str, Any]
 
 @pytest.fixture(scope="module")
 def mapped(running: Server) -> Server:
-    """A robot has driven so far that walls of its map have a history, and stands; one map for all tests."""
+    """A robot has driven so far that walls of its map have a history, and stands; one map for all tests.
+
+    Beside it there is a map whose server was killed while it built it.
+    """
     running.reset()
+    Atlas(running.get("sessions")["store"]["path"]).begin("killed", started=1.0)
     running.api.put("source", json=ROBOT).raise_for_status()
     running.patch("settings", WHOLE_SCANS)
     wait_until(lambda: has_history(running), "there are walls with a history", 120)
@@ -233,6 +239,8 @@ def test_with_the_map_its_walls_and_their_card_go(look: Callable[..., Visitor], 
     found = card(visitor, wall)
     maps = visitor.page.get_by_role("region", name="Maps").get_by_role("listitem")
     expect(maps.filter(has_text="being built")).to_have_count(1)
+    expect(maps.filter(has_text="killed")).to_have_count(1)
+    expect(maps.filter(has_text="killed")).not_to_contain_text("being built")
     mapped.patch("settings", {"navigation": {"mode": "off"}})
     expect(found).to_be_hidden()
     expect(maps.filter(has_text="being built")).to_have_count(0)

@@ -3,7 +3,7 @@
 export const LEAST_PX = 5; // mean half axis on the screen: below it, the mark of the corner would hide the ellipse
 export const APART_PX = 3; // between outlines around one corner that would fall on each other
 export const SIGMAS = Math.sqrt(-2 * Math.log(1 - 0.95)); // of an ellipse that holds 95 %
-const MOST = 0.45; // of the shorter side of the view
+const MOST = 0.2; // of the shorter side of the view: several that do not fit leave it open what is under them
 const VERTICES = 48;
 
 /** Half axes and direction (rad, of the long one) of the one-sigma ellipse of a covariance. */

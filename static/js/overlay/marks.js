@@ -14,6 +14,7 @@ const RING_PX = 12;
 const ARC_STEP = 0.05; // rad along the rim of a sector
 const WEDGE = 0.2; // of what fills it
 const THIN = 0.12; // of what fills an ellipse
+const FAINT = 0.4; // of the outline of one that does not fit into the view, and is not filled
 const FADED_S = 60; // after which a landmark that is not seen looks its palest
 const PALEST = 0.45;
 const FEW = 40; // landmarks that have room for their numbers
@@ -73,10 +74,11 @@ function drawEllipses(pen, look, entries, sizes) {
     .map((ellipse) => ({ ...ellipse, points: outlineOf(ellipse.at, ellipse).map((place) => look.toScreen(place)) }))
     .filter(({ points }) => points.every(Boolean))
     .reverse();
-  for (const { points, colour } of shown) pen.path(points, { fill: colour, opacity: THIN / shown.length, closed: true });
+  for (const { points, colour, size } of shown)
+    if (size !== "shrunk") pen.path(points, { fill: colour, opacity: THIN / shown.length, closed: true });
   for (const { points, colour, dash, opacity = 1, size } of shown) {
     if (size !== "true") sizes[size]++;
-    pen.path(points, { stroke: colour, dash, opacity, closed: true });
+    pen.path(points, { stroke: colour, dash, opacity: size === "shrunk" ? FAINT * opacity : opacity, closed: true });
   }
 }
 
