@@ -18,6 +18,8 @@ MEDIA_TYPES = {
     "csv": "text/csv",
     "geojson": "application/geo+json",
     "png": "image/png",
+    "svg": "image/svg+xml",
+    "dxf": "image/vnd.dxf",
     "zip": "application/zip",
 }
 _EXAMPLES: dict[str, Any] = json.loads(Path(__file__).with_name("examples.json").read_text("utf-8"))

@@ -13,6 +13,7 @@ import { zipped } from "./zip.js";
 const BUILDING = { zip: "ROS map, walls and plan", png: "Picture" };
 const FORMATS = { json: "JSON", csv: "CSV", geojson: "GeoJSON", png: "Picture", zip: "ROS map" };
 const OF_GRID = { zip: "ROS map", png: "Picture" };
+const OF_WALLS = { ...OF_GRID, svg: "Plan, SVG", dxf: "Plan, DXF" };
 const LOADED = ["json", "csv", "geojson", "zip"];
 const OF_ROS = ["yaml", "yml", "pgm", "png", "bmp"]; // which come together
 
@@ -76,8 +77,10 @@ function offer(localization, { navigation }, { sessions }) {
   const ofGrid = isOfScans(navigation, localization);
   const isBuilding = ofGrid && navigation.mode === "slam";
   const isNone = !sessions.length;
-  const links = () => (session === null ? [nothingToSave(isNone)] : saveLinks(session, ofGrid ? OF_GRID : FORMATS));
-  remake($("map-save"), [session, isBuilding, ofGrid, isNone], () => (isBuilding ? buildingLinks() : links()));
+  const hasWalls = Boolean(sessions.find(({ id }) => id === session)?.walls);
+  const formats = hasWalls ? OF_WALLS : ofGrid ? OF_GRID : FORMATS;
+  const links = () => (session === null ? [nothingToSave(isNone)] : saveLinks(session, formats));
+  remake($("map-save"), [session, isBuilding, ofGrid, hasWalls, isNone], () => (isBuilding ? buildingLinks() : links()));
   clearButton.disabled = session === null;
 }
 

@@ -3,8 +3,10 @@
 import io
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 from zipfile import ZipFile
 
+import ezdxf
 import numpy as np
 import pytest
 from lidarcore_app.jobs.wall_writer import CONFIRMED
@@ -30,6 +32,24 @@ def first_pose(server: Server) -> dict[str, float]:
     """Where the trajectory begins; at stamp 0 while it has no pose yet."""
     poses = server.get("/trajectory", limit=10_000)["poses"]
     return poses[0] if poses else {"stamp": 0.0, "x": 0.0, "y": 0.0, "heading": 0.0}
+
+
+def assert_kept_plan_shows_the_walls(server: Server) -> None:
+    """The floor plan of the map in the file: a line for each of its walls, and each corner once, where walls end."""
+    session = max(server.get("/sessions")["sessions"], key=lambda each: each["id"])
+    asked = {"session": session["id"], "format": "dxf"}
+    plan = ezdxf.read(io.StringIO(server.http.get("/map", params=asked).text)).modelspace()
+    assert len(plan.query("LINE")) == session["walls"] > 4
+    corners = np.array([point.dxf.location.vec2 for point in plan.query("POINT")])
+    ends = np.array([(line.dxf.start.vec2, line.dxf.end.vec2) for line in plan.query("LINE")]).reshape(-1, 2)
+    assert len(corners) >= 2
+    for k, corner in enumerate(corners):
+        assert np.hypot(*(ends - corner).T).min() < 2e-3
+        assert np.hypot(*(np.delete(corners, k, axis=0) - corner).T).min() > 2e-3
+    picture = ElementTree.fromstring(server.http.get("/map", params=asked | {"format": "svg"}).text)
+    walls = picture.find(".//*[@id='walls']")
+    assert walls is not None
+    assert len(walls) == session["walls"]
 
 
 def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
@@ -85,6 +105,7 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
 
     driving.change("PATCH", "/source", {"state": "paused"})
     wait_until(lambda: driving.get("/sessions")["store"]["behind_s"] == 0, "the walls are kept")
+    assert_kept_plan_shows_the_walls(driving)
     told = [driving.get(f"/walls/{wall['id']}/history") for wall in driving.get("/walls")["walls"]]
     assert any(of["history"] for of in told)
     # A wall that too few keyframes saw is in the map, but nothing of it is kept.

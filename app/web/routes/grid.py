@@ -54,14 +54,15 @@ def running_walls(runtime: Runtime) -> Walls:
 async def grid(
     server: Server,
     format: Annotated[
-        Literal["png", "zip"], Query(description="the grid as a picture, or all files of `lidarcore map`")
+        Literal["png", "zip"], Query(description="the grid as a picture, or it and the walls as files")
     ] = "png",
 ) -> Response:
     """The map that SLAM makes of whole scans, as a picture of its occupancy grid or as files for other programs.
 
     png: black occupied, white free, grey unknown, y up. Its headers say where it lies: Grid-Resolution is the side of a
     pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
-    zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF.
+    zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF, the
+    picture with its walls; poses are at /trajectory.
     404 if SLAM makes no map of whole scans, or has no walls yet.
     """
     found = running_picture(server.runtime).grid

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from zipfile import ZipFile
 
 import anyio
+import numpy as np
 from fastapi import APIRouter, Query, Request
 from PIL import Image
 from starlette.background import BackgroundTask
@@ -14,8 +15,11 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import FileResponse
 
 from lidarcore.landmarks import Session, export_map, export_picture
+from lidarcore.mapping.export import plan_dxf, plan_svg
 from lidarcore.mapping.grid import shades_of, write_ros_map
+from lidarcore.mapping.walls import WallTable
 
+from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
 from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
@@ -25,6 +29,7 @@ from .landmarks import SessionId, chosen_map
 MAX_BYTES = 32 << 20  # of a map that is loaded, some 150,000 landmarks
 MOST_PIXELS = 16_000_000  # of a picture: 200 m by 200 m at 5 cm, and 32 MB while it is packed
 PICTURES = ("png", "zip")
+PLANS = {"svg": plan_svg, "dxf": plan_dxf}
 
 router = APIRouter(prefix="/map", tags=["landmarks"], responses=documented(422, 503))
 
@@ -42,21 +47,33 @@ FILES: dict[str, Any] = {
     "",
     response_class=FileResponse,
     response_description="The map as a file",
-    responses=formats(json=EXAMPLE, csv=CSV, geojson={"type": "FeatureCollection"}, png="...", zip="...")
+    responses=formats(
+        json=EXAMPLE,
+        csv=CSV,
+        geojson={"type": "FeatureCollection"},
+        png="...",
+        svg="...",
+        dxf="...",
+        zip="...",
+    )
     | documented(404),
 )
 async def download(
     server: Server,
     session: SessionId = None,
     format: Annotated[
-        Literal["json", "csv", "geojson", "png", "zip"],
-        Query(description="zip: image and map.yaml as ROS map_server reads them; png: the picture alone"),
+        Literal["json", "csv", "geojson", "png", "svg", "dxf", "zip"],
+        Query(
+            description="zip: image and map.yaml as ROS map_server reads them; png: the picture alone; "
+            "svg, dxf: the floor plan of its walls, in m"
+        ),
     ] = "json",
     resolution: Annotated[float, Query(ge=1e-3, le=1e3, description="m a pixel, of a picture")] = 0.05,
 ) -> FileResponse:
     """All landmarks of a session, in metres in its world frame. Made for one request at a time: others wait.
 
-    If it has an occupancy grid, the picture is of that, in its own resolution.
+    If it has an occupancy grid, the picture is of that, in its own resolution. 404 if there are no walls to draw a
+    floor plan of.
     """
     make = partial(_file, server.landmarks, session, format, resolution)
     return await anyio.to_thread.run_sync(make, limiter=server.heavy)
@@ -104,7 +121,11 @@ def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution
     try:
         path = Path(folder.name) / f"map.{format}"
         grid = landmarks.grid(landmark_map.session) if format in PICTURES else None
-        if grid is not None and format == "zip":
+        if format in PLANS:
+            path.write_text(
+                _plan(landmarks.walls(landmark_map.session), landmark_map.session, format), "utf-8"
+            )
+        elif grid is not None and format == "zip":
             write_ros_map(grid, path.with_suffix(".yaml"))
         elif grid is not None:
             Image.fromarray(shades_of(grid)).save(path)
@@ -119,6 +140,13 @@ def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution
         raise
     name, cleanup = f"map-{landmark_map.session}.{format}", BackgroundTask(folder.cleanup)
     return FileResponse(path, media_type=MEDIA_TYPES[format], filename=name, background=cleanup)
+
+
+def _plan(walls: WallTable, session: int, format: str) -> str:
+    if not len(walls):
+        raise NotFoundError(f"Map {session} has no walls: no floor plan can be drawn of it.")
+    corners = np.unique(walls.ends[walls.in_corner].round(3), axis=0)  # where two walls end
+    return PLANS[format](walls.ends, corners, np.empty((0, 2)))
 
 
 def _pack(path: Path) -> None:

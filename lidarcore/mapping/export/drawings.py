@@ -18,12 +18,16 @@ _SMALLEST = 1500  # pixels that its longer side should have
 _LAYERS = {"WALLS": 7, "CORNERS": 1, "PATH": 5}  # and their colours in AutoCAD's index
 
 
-def plan_svg(walls: Walls, path: Array) -> str:
-    """Walls, corners and the path (T, 2) m of the sensor in an SVG whose unit is the metre, y up, with a scale."""
-    low, high = _extent(walls, path)
+def plan_svg(ends: Array, corners: Array, path: Array) -> str:
+    """A floor plan as an SVG whose unit is the metre, y up, with a scale.
+
+    ends (W, 2, 2) m of walls, corners (C, 2) m where they meet, path (T, 2) m of the sensor; there may be none of each.
+    Raises MapFileError if there is nothing to draw.
+    """
+    low, high = _extent(ends, path)
     width, height = high - low
-    lines = "".join(f'<path d="M{_at(a)}L{_at(b)}"/>' for a, b in walls.ends)
-    corners = "".join(f'<circle cx="{x:.3f}" cy="{y:.3f}" r=".06"/>' for x, y in walls.corners.xy.tolist())
+    lines = "".join(f'<path d="M{_at(a)}L{_at(b)}"/>' for a, b in ends)
+    dots = "".join(f'<circle cx="{x:.3f}" cy="{y:.3f}" r=".06"/>' for x, y in corners.tolist())
     way = "L".join(_at(xy) for xy in path)
     bar = max((length for length in _BARS if length <= width / 4), default=_BARS[0])
     return (
@@ -33,7 +37,7 @@ def plan_svg(walls: Walls, path: Array) -> str:
         f'<g transform="scale(1 -1)" fill="none" stroke-linecap="round">\n'
         + (f'<path id="path" d="M{way}" stroke="#7ac" stroke-width=".03"/>\n' if way else "")
         + f'<g id="walls" stroke="#222" stroke-width=".06">{lines}</g>\n'
-        f'<g id="corners" fill="#c30">{corners}</g>\n</g>\n'
+        f'<g id="corners" fill="#c30">{dots}</g>\n</g>\n'
         f'<g id="scale" transform="translate({low[0] + 0.4:.3f} {-low[1] - 0.3:.3f})" stroke="#222">\n'
         f'<path d="M0-.1V.1M0 0H{bar:g}M{bar:g}-.1V.1" fill="none" stroke-width=".04"/>\n'
         f'<text x="{bar + 0.2:g}" y=".12" font-size=".4" font-family="sans-serif" stroke="none">{bar:g} m</text>'
@@ -42,17 +46,17 @@ def plan_svg(walls: Walls, path: Array) -> str:
     )
 
 
-def plan_dxf(walls: Walls, path: Array) -> str:
-    """A floor plan as a DXF (R2010) in metres, with the layers WALLS, CORNERS and PATH."""
+def plan_dxf(ends: Array, corners: Array, path: Array) -> str:
+    """The same as a DXF (R2010) in metres, with the layers WALLS, CORNERS and PATH."""
     import ezdxf  # here: importing it takes a second, and a server that starts needs none
 
     document = ezdxf.new("R2010", units=ezdxf.units.M)
     for name, colour in _LAYERS.items():
         document.layers.add(name, color=colour)
     space = document.modelspace()
-    for a, b in walls.ends.tolist():
+    for a, b in ends.tolist():
         space.add_line(a, b, dxfattribs={"layer": "WALLS"})
-    for xy in walls.corners.xy.tolist():
+    for xy in corners.tolist():
         space.add_point(xy, dxfattribs={"layer": "CORNERS"})
     if len(path) > 1:
         space.add_lwpolyline(path.tolist(), dxfattribs={"layer": "PATH"})
@@ -83,8 +87,8 @@ def _pixels(grid: OccupancyGrid, xy: Array, zoom: int) -> list[tuple[float, floa
     return [(x * zoom, (len(grid.cells) - y) * zoom) for x, y in grid.in_cells(xy).tolist()]
 
 
-def _extent(walls: Walls, path: Array) -> tuple[Array, Array]:
-    points = np.concatenate([walls.ends.reshape(-1, 2), path])
+def _extent(ends: Array, path: Array) -> tuple[Array, Array]:
+    points = np.concatenate([ends.reshape(-1, 2), path])
     if not len(points):
         raise MapFileError("There are no walls and no path: nothing to draw.")
     return points.min(axis=0) - _MARGIN, points.max(axis=0) + _MARGIN

@@ -20,8 +20,8 @@ MAP_FILES: dict[str, Callable[[OccupancyGrid, Walls, Array], bytes]] = {
     "map.yaml": lambda grid, walls, path: ros_yaml(grid, "map.pgm").encode(),
     "walls.csv": lambda grid, walls, path: walls_csv(walls).encode(),
     "walls.geojson": lambda grid, walls, path: walls_geojson(walls).encode(),
-    "plan.svg": lambda grid, walls, path: plan_svg(walls, path).encode(),
-    "plan.dxf": lambda grid, walls, path: plan_dxf(walls, path).encode(),
+    "plan.svg": lambda grid, walls, path: plan_svg(walls.ends, walls.corners.xy, path).encode(),
+    "plan.dxf": lambda grid, walls, path: plan_dxf(walls.ends, walls.corners.xy, path).encode(),
     "map.png": map_png,
 }
 """The files of a map by name, and what makes each of grid, walls and the path (T, 2) m of the sensor."""
