@@ -65,9 +65,12 @@ async function list() {
   if (maps) set("maps", maps);
 }
 
+const NONE = "None yet. SLAM builds one, or load a file: landmarks, or a map of ROS.";
+const NOT_KEPT = "None yet. A map is kept once its walls were seen from several places, or its landmarks several times.";
+
 function draw({ sessions, store }, { session, mode }, landmarks) {
   const built = mode === "slam" ? store.session : undefined; // one whose server was killed has no end either
-  const live = { session, landmarks: landmarks.size, built };
+  const live = { session, landmarks: landmarks.size, built, none: mode === "slam" ? NOT_KEPT : NONE };
   remake($("map-list"), [sessions, store.error, live], () => rows(sessions, store, live));
 }
 
@@ -87,7 +90,7 @@ function offer(localization, { navigation }, { sessions }) {
 function rows(sessions, { error }, live) {
   return [
     ...(error ? [el("p", { class: "fault", role: "alert" }, error)] : []),
-    ...(sessions.length ? [] : [el("p", { class: "muted" }, "None yet. SLAM builds one, or load a file: landmarks, or a map of ROS.")]),
+    ...(sessions.length ? [] : [el("p", { class: "muted" }, live.none)]),
     el("ul", { class: "entries" }, ...[...sessions].reverse().map((session) => row(session, live))),
   ];
 }
