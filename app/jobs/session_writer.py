@@ -4,7 +4,6 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from types import MappingProxyType
 from typing import Any
 
@@ -22,9 +21,9 @@ class MapChange:
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """What writes the newest map of a run, for the last time or not, and since when something has waited for that."""
+    """The newest map of a run, as its `write` takes it, for the last time or not; something has waited since then."""
 
-    write: Callable[..., MapChange | None]
+    content: tuple[Any, ...]
     ended: bool
     since: float
 
@@ -50,7 +49,7 @@ class SessionWriter(ABC):
         self.replay = replay
         self._atlas, self._source, self._schedule, self._started = atlas, source, schedule, time.time()
         self._map: LandmarkMap | None = None
-        self._newest: Callable[..., MapChange | None] | None = None
+        self._newest: tuple[Any, ...] | None = None
 
     @property
     def session(self) -> int | None:
@@ -59,12 +58,12 @@ class SessionWriter(ABC):
 
     def put(self, *content: Any) -> None:
         """Write the map as it is now, unless a newer one comes first; the arguments are those of `write`."""
-        self._newest = partial(self.write, *content)
+        self._newest = content
         self._schedule(self, Waiting(self._newest, ended=False, since=time.monotonic()))
 
     def end(self) -> None:
         """Write what is left, and that the run has ended."""
-        if self._newest:
+        if self._newest is not None:
             self._schedule(self, Waiting(self._newest, ended=True, since=time.monotonic()))
 
     @abstractmethod

@@ -62,24 +62,29 @@ class WriteQueue:
             self._news.notify()
 
     def _work(self) -> None:
-        while True:
-            with self._news:
-                self._news.wait_for(lambda: self._waiting or self._closing.is_set())
-                if not self._waiting:
-                    return
-                run = next(iter(self._waiting))
-                self._writing = waiting = self._waiting.pop(run)
-            is_last = self._closing.is_set()
-            pause = self._attempt(run, waiting)
-            self._writing = None
-            if is_last and self.error:
-                return
+        while (pause := self._write_next()) is not None:
             self._closing.wait(pause)
+
+    def _write_next(self) -> float | None:
+        """Wait for something and write it; how long to wait before the next, s, or None if there is to be none.
+
+        What was written is let go of here: while nothing comes, maps of hundreds of megabytes would stay.
+        """
+        with self._news:
+            self._news.wait_for(lambda: self._waiting or self._closing.is_set())
+            if not self._waiting:
+                return None
+            run = next(iter(self._waiting))
+            self._writing = waiting = self._waiting.pop(run)
+        is_last = self._closing.is_set()
+        pause = self._attempt(run, waiting)
+        self._writing = None
+        return None if is_last and self.error else pause
 
     def _attempt(self, run: SessionWriter, waiting: Waiting) -> float:
         """Write, and tell; how long to wait before the next time, s."""
         try:
-            change = waiting.write(final=waiting.ended)
+            change = run.write(*waiting.content, final=waiting.ended)
             if waiting.ended:
                 run.finish()
                 self._ended(run)

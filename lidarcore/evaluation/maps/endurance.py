@@ -21,6 +21,7 @@ from lidarcore.simulation.settings import SimulationSettings
 
 _FREE = 254  # shade of a cell
 _SLEEP = 0.001  # s, while keyframes wait: here scans come faster than a sensor sends them
+_CATCH_UP = 2.5  # s without scans, within which grid and walls know of the last ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +63,7 @@ def endurance(
                 if first is None:
                     first = scan.truth
                 seen.append(_step(tracker, scan, first))
+            time.sleep(_CATCH_UP)
             yield _stretch(tracker, seen, minutes * (stretch + 1) / stretches)
             done()
 
