@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from lidarcore import Array
     from lidarcore.evaluation.maps.study import MapStudy
 
-_AT_A_SCAN = 0.006  # s, in which a robot hardly moves
+_AT_A_SCAN = 0.0005  # s: loggers that were late write scans within milliseconds, so that farther away is another one
 
 
 def evaluate_map(
