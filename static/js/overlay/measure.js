@@ -8,6 +8,7 @@ import { isMapFirst } from "../mapped.js";
 import { get, set } from "../store.js";
 import { degrees, metres, millimetres } from "../units.js";
 
+const PARALLEL = 0.35; // rad between walls from which on they have no distance: they meet
 const HINT = "Click two corners or walls";
 const MIXED = "One is only in the scan, the other only in the map: click two of the scan, or two of the map";
 
@@ -48,10 +49,12 @@ async function measure(first, second) {
   if (isMeasuring()) set("measure", found ? { first: found.first, second: found.second, found } : {});
 }
 
-/** "3.412 m ± 9 mm", and the angle where there is one. */
+/** "3.412 m ± 9 mm", the angle where there is one, and of walls that are not about parallel only that. */
 export function measureText({ distance, sigma, angle, angle_sigma: turn }) {
   const length = `${metres(distance)}\u2009m ± ${millimetres(sigma)}\u2009mm`;
-  return angle === null ? length : `${length}, ${degrees(angle)}° ± ${degrees(turn)}°`;
+  if (angle === null) return length;
+  const between = `${degrees(angle)}° ± ${degrees(turn)}°`;
+  return angle > PARALLEL ? between : `${length}, ${between}`;
 }
 
 function say(words) {
