@@ -63,6 +63,7 @@ class Runtime:
         self._tracker, self._source = Tracker(dormant=DORMANT), 0
         self._times: deque[float] = deque(maxlen=20)
         self._sequence = 0
+        self._told: tuple[object, ...] = ()  # of the run that goes on
         self._noise_check = NoiseCheck()
         self._processing = FailureLog("scan %s could not be processed")
         self._lock = threading.Lock()
@@ -167,6 +168,7 @@ class Runtime:
         while (timed := self._newest.take()) is not None:
             with self._processing(timed.position):
                 self._publish(self._process(timed))
+                self._tell_of_run()
             self._newest.done()
             self.player.wake()
 
@@ -212,6 +214,13 @@ class Runtime:
         self.frame = frame.drawn(1e6 * (time.perf_counter() - begin))
         for listener in self.frame_listeners:
             listener(self.frame)
+
+    def _tell_of_run(self) -> None:
+        """A run begins with its first scan: only then is it known what it localizes by, and in which map."""
+        run = self.navigation
+        if (now := (run.session, run.method, run.problem)) != self._told:
+            self._told = now
+            self.announce()
 
     def _rate(self) -> float:
         """Frames per second over the last ones; 0 after a pause."""

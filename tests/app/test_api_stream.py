@@ -55,6 +55,16 @@ def test_walls_of_the_map_are_told_of_when_they_change_and_to_who_comes_later(se
         assert stream.until("walls", bool) == {"type": "walls", "walls": [], "corners": []}
 
 
+def test_a_run_that_begins_is_told_of_though_nothing_else_changes(server: Server) -> None:
+    """What a recording is localized by is known with its first scan; no counters of a live source bring it along."""
+    server.play(write_room(server.folder / "long.npz", scans=600))
+    with server.stream() as stream:
+        server.change("PATCH", "/settings", {"navigation": {"mode": "slam", "method": "scans"}})
+        stream.until("state", lambda state: state["localization"]["method"] == "scans")
+        server.change("PATCH", "/settings", {"navigation": {"mode": "off"}})
+        stream.until("state", lambda state: state["localization"]["method"] is None)
+
+
 def test_every_change_is_told_to_every_client(server: Server, room: Path) -> None:
     with server.stream() as one, server.stream() as other:
         for method, path, body, holds in [

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from lidarcore import Array
     from lidarcore.evaluation.maps.study import MapStudy
 
-_AT_A_SCAN = 0.0005  # s: loggers that were late write scans within milliseconds, so that farther away is another one
+_AT_A_SCAN = (
+    0.0005  # s: loggers that were late write scans within milliseconds, so that farther away is another one
+)
 
 
 def evaluate_map(
