@@ -99,6 +99,12 @@ class LandmarkStore:
             self._run.end()
         self._run, self._used = None, session
 
+    def settle(self) -> None:
+        """The run ends, and is on the disk when this returns, unless that takes seconds: its map may be used next."""
+        if self._run:
+            self.use(None)
+            self._queue.settle(PATIENCE)
+
     def map(self, session: int | None = None) -> LandmarkMap | None:
         """The map of a session; if none is given that which is written or used, else the newest; None if none is.
 

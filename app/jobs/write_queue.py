@@ -40,8 +40,13 @@ class WriteQueue:
         """Wait (bounded) until all is written; False if the thread may still write."""
         self._closing.set()
         with self._news:
-            self._news.notify()
+            self._news.notify_all()
         return join(self._thread, END_WITHIN)
+
+    def settle(self, within: float) -> bool:
+        """Wait until all is written, at most so many seconds; whether it is."""
+        with self._news:
+            return self._news.wait_for(lambda: not self._waiting and self._writing is None, within)
 
     @property
     def behind_s(self) -> float:
@@ -59,7 +64,7 @@ class WriteQueue:
                 del self._waiting[next(iter(self._waiting))]
                 self.error = f"More than {MOST_RUNS} maps waited to be written: the oldest is lost."
                 logger.warning(self.error)
-            self._news.notify()
+            self._news.notify_all()
 
     def _work(self) -> None:
         while (pause := self._write_next()) is not None:
@@ -78,7 +83,9 @@ class WriteQueue:
             self._writing = waiting = self._waiting.pop(run)
         is_last = self._closing.is_set()
         pause = self._attempt(run, waiting)
-        self._writing = None
+        with self._news:
+            self._writing = None
+            self._news.notify_all()
         return None if is_last and self.error else pause
 
     def _attempt(self, run: SessionWriter, waiting: Waiting) -> float:

@@ -52,6 +52,9 @@ class MapStore(Protocol):
     def use(self, session: int | None) -> None:
         """No map is built any more; that of a session is used, if one is given."""
 
+    def settle(self) -> None:
+        """What was built until now is kept when this returns."""
+
     def newest(self) -> int | None:
         """The newest session to localize in."""
 
@@ -83,6 +86,7 @@ class Navigation:
     def __init__(self, store: MapStore) -> None:
         self.odometry = OdometryFeed()
         self.problem: str | None = None
+        self.runs = 0  # that have begun
         self._store = store
         self._map: int | None = None
         self._run: Run | None = None
@@ -211,12 +215,14 @@ class Navigation:
             self._run = self._localizing(timed, settings)
         else:
             self._store.use(None)
+        self.runs += self._run is not None
         if self._run and self._placed:
             self._run.navigator.place(*self._placed)
             self._placed = None
         return self._run
 
     def _localizing(self, timed: TimedScan, settings: Settings) -> Run | None:
+        self._store.settle()
         session = self._map if self._map is not None else self._store.newest()
         self._store.use(session)
         if session is None:

@@ -218,7 +218,7 @@ class Runtime:
     def _tell_of_run(self) -> None:
         """A run begins with its first scan: only then is it known what it localizes by, and in which map."""
         run = self.navigation
-        if (now := (run.session, run.method, run.problem)) != self._told:
+        if (now := (run.runs, run.session, run.method, run.problem)) != self._told:
             self._told = now
             self.announce()
 

@@ -60,7 +60,12 @@ def test_a_run_that_begins_is_told_of_though_nothing_else_changes(server: Server
     server.play(write_room(server.folder / "long.npz", scans=600))
     with server.stream() as stream:
         server.change("PATCH", "/settings", {"navigation": {"mode": "slam", "method": "scans"}})
-        stream.until("state", lambda state: state["localization"]["method"] == "scans")
+        state = stream.state(lambda state: state["localization"]["method"] == "scans")
+        newest = stream.frame()["sequence"]
+        server.change("PATCH", "/source", {"index": 0})  # the next run is one of the same kind
+        while (message := stream.message())["type"] != "frame" or message["sequence"] < newest + 20:
+            state = message if message["type"] == "state" else state
+        assert state["localization"]["method"] == "scans"
         server.change("PATCH", "/settings", {"navigation": {"mode": "off"}})
         stream.until("state", lambda state: state["localization"]["method"] is None)
 

@@ -175,6 +175,19 @@ def test_a_run_keeps_its_confirmed_walls_and_says_when_it_has_ended(tmp_path: Pa
         assert session.ended is not None
 
 
+def test_a_map_is_on_the_disk_before_another_run_uses_it(tmp_path: Path) -> None:
+    """Many times, as a map that is just being written, or about to be, would be missed only sometimes."""
+    with closing(LandmarkStore(tmp_path / "maps.db")) as store:
+        for count in range(1, 9):
+            run = store.begin_walls("room.mcap")
+            for number in range(1, count + 1):
+                run.put(GRID, walls(*map(stored, range(number))))
+            store.settle()
+            assert store.newest() == run.session
+            assert len(store.walls(run.session)) == count
+            assert store.atlas.sessions()[-1].ended is not None
+
+
 def test_the_grid_of_a_run_is_kept_with_its_walls(tmp_path: Path) -> None:
     newer = replace(GRID, cells=GRID.cells.T)
     with closing(LandmarkStore(tmp_path / "maps.db")) as store:
