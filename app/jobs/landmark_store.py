@@ -153,7 +153,7 @@ class LandmarkStore:
 
     def _replace_earlier(self, run: SessionWriter) -> None:
         """Give up the map of the run before with the same `replay`, unless it is in use."""
-        if run.replay is None or run.session is None:
+        if run.replay is None or run.session is None or run.session < self._finished.get(run.replay, 0):
             return
         earlier, self._finished[run.replay] = self._finished.get(run.replay), run.session
         if earlier is not None and earlier not in (self._used, run.session):

@@ -50,6 +50,7 @@ class SessionWriter(ABC):
         self._atlas, self._source, self._schedule, self._started = atlas, source, schedule, time.time()
         self._map: LandmarkMap | None = None
         self._newest: tuple[Any, ...] | None = None
+        self._has_ended = False
 
     @property
     def session(self) -> int | None:
@@ -57,12 +58,16 @@ class SessionWriter(ABC):
         return None if self._map is None else self._map.session
 
     def put(self, *content: Any) -> None:
-        """Write the map as it is now, unless a newer one comes first; the arguments are those of `write`."""
+        """Write the map as it is now, unless a newer one comes first; the arguments are those of `write`.
+
+        The last one may come when the run has ended.
+        """
         self._newest = content
-        self._schedule(self, Waiting(self._newest, ended=False, since=time.monotonic()))
+        self._schedule(self, Waiting(content, self._has_ended, since=time.monotonic()))
 
     def end(self) -> None:
         """Write what is left, and that the run has ended."""
+        self._has_ended = True
         if self._newest is not None:
             self._schedule(self, Waiting(self._newest, ended=True, since=time.monotonic()))
 

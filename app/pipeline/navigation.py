@@ -199,6 +199,8 @@ class Navigation:
         run, wanted = self._run, settings.navigation
         if run and run.is_continued_by(timed, wanted):
             return run
+        if run and wanted.mode == "localize":
+            run.close()  # its map may be the one to localize in
         self._drop_run()
         self.problem = None
         replay = (timed.name, wanted) if timed.position.kind == "recording" else None

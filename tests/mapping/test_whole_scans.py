@@ -121,3 +121,17 @@ def test_walls_catch_up_when_no_more_scans_come(slam: WholeScans, drive: list[Sc
         return walls is not None and bool(walls.last_seen.max() >= drive[130].stamp)
 
     wait_until(is_complete)
+
+
+def test_what_is_kept_at_the_end_knows_the_last_scans(drive: list[Scan]) -> None:
+    """At this speed walls are sought once or twice; the rest of the drive is kept only as it ends."""
+    kept = []
+    slam = WholeScans(begin_map=lambda: lambda grid, walls: kept.append((grid, walls)))
+    followed(slam, drive[:300])
+    wait_until(lambda: not slam.is_behind)
+    before = len(kept)
+    slam.close()
+    assert len(kept) == before + 1
+    grid, walls = kept[-1]
+    assert walls.last_seen.max() >= drive[290].stamp
+    assert grid.free.sum() * grid.resolution**2 > 40

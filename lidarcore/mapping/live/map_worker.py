@@ -35,7 +35,7 @@ _NOT_PLACED = "A map of whole scans begins where its first scan was taken and ca
 class MapWorker(Background):
     """Takes keyframes and makes a map of them.
 
-    keep  called with grid and walls, in the thread of the map, each time that walls were found
+    keep  called with grid and walls, in the thread of the map, each time that walls were found, and at the end
     """
 
     mode = "slam"
@@ -56,7 +56,7 @@ class MapWorker(Background):
         self._next_picture = self._next_walls = 0.0
         self._walled = 0  # nodes that the walls know
         self._failures = FailureLog("the map could not be brought up to date")
-        self._worker = Worker(self._work, "map", idle=_EVERY)
+        self._worker = Worker(self._work, "map", idle=_EVERY, last=self._finish)
 
     def place(self, T_map_keyframe: UncertainPose) -> None:
         """Raises LocalizationError: the map begins at its first scan, and cannot be moved."""
@@ -79,6 +79,13 @@ class MapWorker(Background):
         lacks = len(self._drawn) < known or (self._walled < known and now >= self._next_walls)
         if lacks and now >= self._next_picture:
             self._draw()
+
+    def _finish(self) -> None:
+        """What is kept knows all keyframes that were added, also those since walls were sought last."""
+        self._next_walls = 0.0
+        with self._failures():
+            if self._keep and self._walled < len(self._back.graph) and self._back.keyframes:
+                self._draw()
 
     def _add(self, tracked: Tracked) -> None:
         self._back.add(tracked)

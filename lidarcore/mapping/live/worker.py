@@ -17,16 +17,23 @@ class Worker(Generic[Item]):
     thus never more than will be kept.
 
     idle  s without an item after which job(None, 0) is called; never if None
+    last  called in the thread before it ends, unless something has ended it
     """
 
-    def __init__(self, job: Callable[[Item | None, int], None], name: str, idle: float | None = None) -> None:
+    def __init__(
+        self,
+        job: Callable[[Item | None, int], None],
+        name: str,
+        idle: float | None = None,
+        last: Callable[[], None] = lambda: None,
+    ) -> None:
         self._idle = idle
         self._queue: deque[Item] = deque()
         self._filled = threading.Condition()
         self._closing = False
         self._failure: BaseException | None = None
         # The job may hold the worker: only the thread holds the job, so that both are freed as soon as it has ended.
-        self._thread = threading.Thread(target=self._run, args=(job,), name=name, daemon=True)
+        self._thread = threading.Thread(target=self._run, args=(job, last), name=name, daemon=True)
         self._thread.start()
 
     @property
@@ -56,10 +63,11 @@ class Worker(Generic[Item]):
         if self._failure is not None:
             raise self._failure
 
-    def _run(self, job: Callable[[Item | None, int], None]) -> None:
+    def _run(self, job: Callable[[Item | None, int], None], last: Callable[[], None]) -> None:
         try:
             while self._next(job):
                 pass
+            last()
         except BaseException as failure:  # told to whoever brings the next item
             self._failure = failure
 
