@@ -72,6 +72,19 @@ def test_the_true_place_is_found_wherever_the_graph_expects_it(off):
     assert np.abs(places(FURNISHED, off)).min() < 0.1
 
 
+def test_what_was_seen_just_before_is_a_place_too():
+    """An island that is joined to the last keyframes before it: they are no farther back than one pass of loops."""
+    truth, graph, keyframes = newest_on_first(FURNISHED, 0.0)
+    passes, k = Passes(graph, keyframes, LOOPS, MATCH.reach), len(truth) - 1
+    assert passes.around(k - 3, k, 0.0).tolist() == [k - 7, k - 6, k - 5, k - 4, k - 3]
+    assert passes.around(40, k, 0.0).tolist() == list(range(36, 45))
+    assert passes.around(40, k, 4.2).tolist() == list(range(32, 49))
+    hypotheses = Hypotheses(graph, keyframes, passes, LOOPS, MATCH)
+    seen = passes.seen(k, np.arange(k - 2, k + 1))
+    (loop,) = hypotheses.at(k - 3, k, np.diag([0.05, 0.05, 0.02]) ** 2, seen)
+    assert np.abs(loop.pose - relative(truth[k - 3], truth[k])).max() < 0.05
+
+
 @pytest.mark.parametrize("off", [-4.9, 4.9])
 def test_doors_that_are_alike_are_rivals_of_each_other(off):
     """Nothing tells one door from the next, so that none may be believed alone; all of them lie a door apart."""

@@ -79,9 +79,9 @@ class Hypotheses:
     def _tied(self, i: int, k: int, place: Array, seen: Patches, gated: bool) -> Loop | None:
         """Node k, taken to be at a place (3,), registered on what was seen around node i; None if it does not fit."""
         mean, P = self._graph.relative(i, k)
-        half, match, start = self._settings.before, self._match, relative(self._graph.poses[i], place)
-        around = np.arange(max(0, i - half), min(i + half + 1, k - self._settings.apart))
-        reference = surfels(self._passes.seen(i, around), match.patch, match.reach)
+        match, start = self._match, relative(self._graph.poses[i], place)
+        earlier = self._passes.seen(i, self._passes.around(i, k, 0.0))
+        reference = surfels(earlier, match.patch, match.reach)
         start[2] = mean[2] + wrap(start[2] - mean[2])
         prior = information_of(_WIDEN * _cautious(P))
         registered = register(reference, seen, start, mean, prior, match.reach)

@@ -84,8 +84,11 @@ class Passes:
         return bool(3 * spread(P) >= self._reach)
 
     def around(self, i: int, k: int, far: float) -> Ints:
-        """Nodes of the pass of node i, before node k, up to `far` m from it, and its neighbours."""
-        half, poses = self._settings.before, self._graph.poses[: k - self._settings.apart]
+        """Nodes of the pass of node i up to `far` m from it, and its neighbours; none that are of node k's own pass.
+
+        An island may be joined to what was mapped just before it: node i itself is among them always.
+        """
+        half, poses = self._settings.before, self._graph.poses[: max(k - self._settings.apart, i + 1)]
         near = np.hypot(*(poses[:, :2] - poses[i, :2]).T) < far
         near[max(0, i - half) : i + half + 1] = True
         return next(run for run in _runs(np.flatnonzero(near)) if i in run)
