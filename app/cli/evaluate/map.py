@@ -15,9 +15,8 @@ if TYPE_CHECKING:
     from lidarcore import Array
     from lidarcore.evaluation.maps.study import MapStudy
 
-_AT_A_SCAN = (
-    0.0005  # s: loggers that were late write scans within milliseconds, so that farther away is another one
-)
+# s. Loggers that were late write several scans within milliseconds: a stamp that is farther away is another one's.
+_AT_A_SCAN = 0.0005
 
 
 def evaluate_map(

@@ -88,9 +88,8 @@ def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
     """How far two corners or walls of the current frame, or of its map, are from each other, and how sure that is.
 
     From a corner to a wall: across its line; between walls: across, on the average, which says nothing of walls that
-    are not about parallel: their `angle` tells. 404 if nothing is near a place, or
-    both places name the same thing; 422 if one is of the scan and the other of the map, which err together in ways that
-    nobody knows.
+    are not about parallel: their `angle` tells. 404 if nothing is near a place, or both places name the same thing;
+    422 if one is of the scan and the other of the map, which err together in ways that nobody knows.
     """
     if first.startswith("map-") != second.startswith("map-"):
         raise ProblemError(422, MIXED)
