@@ -13,7 +13,7 @@ from lidarcore.mapping.graph.refinement import Refined
 from lidarcore.mapping.loops.back import BackEnd
 from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.keyframes import Keyframes
-from lidarcore.mapping.matching.distortion import half_time, pose_shift
+from lidarcore.mapping.matching.distortion import half_time, own_variances, pose_shift
 from lidarcore.mapping.matching.front import FrontEnd
 from lidarcore.mapping.matching.motion_smoothing import ScanMotion, smoothed
 from lidarcore.mapping.settings import MapperSettings
@@ -194,8 +194,15 @@ class Mapper:
 
 def _motion_of(tracked: Tracked) -> ScanMotion:
     variances = np.diagonal(tracked.tie.covariance - tracked.sweep)
-    half, shift = half_time(tracked.scan), pose_shift(tracked.scan, tracked.patches)
-    nothing = np.zeros((3, 3))
     return ScanMotion(
-        half, tracked.velocity, np.zeros(3), variances, variances, tracked.sweep, nothing, shift, tracked.on
+        half=half_time(tracked.scan),
+        velocity=tracked.velocity,
+        acceleration=np.zeros(3),
+        variances=variances,
+        own=own_variances(tracked.patches),
+        scatter=variances,
+        sweep=tracked.sweep,
+        shared=np.zeros((3, 3)),
+        shift=pose_shift(tracked.scan, tracked.patches),
+        on=tracked.on,
     )

@@ -1,4 +1,4 @@
-"""What a wrong idea of the sensor's motion within a scan does to where the scan is found to lie."""
+"""What a scan's own noise, and a wrong idea of the sensor's motion within it, do to where it is found to lie."""
 
 import numpy as np
 
@@ -26,12 +26,24 @@ def pose_shift(scan: Scan, seen: Patches) -> Array:
     if scan.beam_times is None or not is_swept(scan) or not len(seen.means):
         return shift
     order = np.argsort(scan.bearings)
-    (x, y), (a, b) = seen.means.T, seen.normals.T
     h = half_time(scan)
-    t = np.interp(np.arctan2(y, x), scan.bearings[order], scan.beam_times[order]) - h
-    A = np.stack([a, b, b * x - a * y], -1)
-    W = A / seen.variances[:, None]
-    H = W.T @ A + _PRIOR
+    bearings = np.arctan2(seen.means[:, 1], seen.means[:, 0])
+    t = np.interp(bearings, scan.bearings[order], scan.beam_times[order]) - h
+    A, W, H = _equations(seen)
     for degree, bend in enumerate((t, t**2 / 2 - h**2 / 6)):
         shift[degree] = -np.linalg.solve(H, W.T @ (bend[:, None] * A))
     return shift
+
+
+def own_variances(seen: Patches) -> Array:
+    """(3,) m², rad² of a scan's pose on surfaces that are known, by the noise of its patches alone."""
+    variances: Array = np.diagonal(np.linalg.inv(_equations(seen)[2]))
+    return variances
+
+
+def _equations(seen: Patches) -> tuple[Array, Array, Array]:
+    """What each of N patches says of the pose (N, 3), the same by its weight (N, 3), and the information (3, 3)."""
+    (x, y), (a, b) = seen.means.T, seen.normals.T
+    A = np.stack([a, b, b * x - a * y], -1)
+    W = A / seen.variances[:, None]
+    return A, W, W.T @ A + _PRIOR

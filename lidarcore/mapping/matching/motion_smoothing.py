@@ -25,6 +25,7 @@ class ScanMotion(NamedTuple):
     velocity      (3,) m/s, m/s, rad/s in the mean time of its beams that was taken out of it
     acceleration  (3,) m/s², m/s², rad/s², likewise
     variances     (3,) of the pose that it was placed at
+    own           (3,) of its pose by its own noise alone: its neighbours share the errors of the map they all lie on
     scatter       (3,) of these, what differs from scan to scan
     sweep         (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
     shared        (3, 3) covariance of that with the error of its place, from which its speed is told, too
@@ -36,6 +37,7 @@ class ScanMotion(NamedTuple):
     velocity: Array
     acceleration: Array
     variances: Array
+    own: Array
     scatter: Array
     sweep: Array
     shared: Array
@@ -67,8 +69,11 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     since = stamps[there] - stamps[:, None] + h[there, 0] - h
     told = (at == there) & on[there] & (np.abs(since) < PAUSE)
     known = on & (h[:, 0] > 0) & (told.sum(axis=1) > 1)
-    variances = np.array([one.variances for one in motions])
-    variances[0] = variances[min(1, len(motions) - 1)]  # the first scan is the map: others share its errors
+    matched = np.array([one.variances for one in motions])
+    matched[0] = matched[
+        min(1, len(motions) - 1)
+    ]  # the first scan, which is the map, was matched with nothing
+    variances = np.minimum(matched, [one.own for one in motions])
     laid = compose(poses, _covered(removed, h))
     means, shown = laid, removed
     for _ in range(_ROUNDS):
