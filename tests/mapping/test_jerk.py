@@ -113,13 +113,26 @@ def test_the_claims_hold_for_motions_whose_jerkiness_nobody_told():
     order = rng.permutation(n)
     told = window(places[order])
     drive = Drive.of(told)
-    assert drive.noise[0] in (0.125, 0.25, 0.5)
+    assert 0.17 < drive.noise[0] < 0.36
     assert drive.noise[1] == 1
     assert drive.shares[np.argmin(np.abs(_JERKS[:, 0] - 3)), 0] > 0.2
     rates, C, _ = estimated(told, drive)
     off = rates[:, :, 0] - np.stack([v, a], -1)[order]
     squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(C[:, 0]), off) / 2
     assert 0.85 < squares.mean() < 1.15
+
+
+def test_what_scatters_about_a_steady_way_is_noise_and_no_jerk():
+    """Twelve drives of 300 places each; with all jerks taken for as frequent, noise came out a quarter too small."""
+    rng, found = np.random.default_rng(3), []
+    for _ in range(12):
+        off = rng.normal(0, SIGMA[0], (306, 3))
+        places = np.stack([off[k : k + 300] for k in range(7)], 1)
+        found.append(Drive.of(window(places - places[:, 3:4], SIGMA[0] ** 2, h=0.05)).noise)
+    means = np.exp(np.mean(np.log(found), axis=0))
+    print(means)
+    assert (means[:2] > 0.85).all()
+    assert (means < 1.15).all()
 
 
 def test_a_place_that_is_not_told_says_nothing():

@@ -11,13 +11,14 @@ from scipy.special import logsumexp, softmax
 
 from lidarcore.arrays import Array, Bools
 
-_USUAL = np.array([[1.0, 10.0, 1.0], [1.0, 10.0, 1.0], [1.0, 10.0, 2.0]])
-"""Standard deviations of place, speed and acceleration in m and rad, before any place says anything."""
+_PRIOR = np.array([[1.0, 10.0, 1.0], [1.0, 10.0, 1.0], [1.0, 10.0, 2.0]])[..., None] ** 2 * np.eye(3)
+"""(3, 3, 3) covariances of place, speed and acceleration in m and rad, before any place says anything."""
 _JERKS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
 """What may change an acceleration within a second, from the steadiest drive to the jerkiest: m/s², m/s², rad/s²."""
-_NOISES = 2.0 ** np.arange(3, -8, -1)
+_NOISES = 2.0 ** np.arange(3, -8, -0.5)
 """Times the variances of places, which their noise may really have."""
 _ENOUGH = 300  # times that tell the noise
+_RAREST = 1e-9  # share of a density, at least: no drive is so long that it rules one out
 _ROUNDS = 20  # of expectation maximisation
 
 
@@ -57,15 +58,21 @@ class Drive(NamedTuple):
 
     @classmethod
     def of(cls, window: Window) -> "Drive":
-        """By some of its times, maximum likelihood."""
+        """By some of its times, maximum likelihood of both together: one of them alone takes the other's place."""
         some = Window(*(column[:: -(-len(window.places) // _ENOUGH)] for column in window))
-        evidences = np.array([[_fit(some, n, jerk)[0] for jerk in _JERKS] for n in _NOISES])
-        best = np.argmax(logsumexp(evidences, axis=1).sum(axis=1), axis=0)
-        chosen = evidences[best, :, :, np.arange(3)].transpose(1, 2, 0)
-        shares = np.full((len(_JERKS), 3), 1 / len(_JERKS))
-        for _ in range(_ROUNDS):
-            shares = softmax(chosen + np.log(shares)[:, None], axis=0).mean(axis=1)
-        return cls(_NOISES[best], shares)
+        likelihoods, shares = zip(*(_most_likely(some, noise) for noise in _NOISES), strict=True)
+        best = np.argmax(likelihoods, axis=0)
+        return cls(_NOISES[best], np.array(shares)[best, :, np.arange(3)].T)
+
+
+def _most_likely(window: Window, noise: float) -> tuple[Array, Array]:
+    """Log-likelihood (3,) of `noise` times the variances, with the shares (J, 3) of densities that make it largest."""
+    evidences = np.array([_evidence(window, noise, jerk)[0] for jerk in _JERKS])
+    shares = np.full((len(_JERKS), 3), 1 / len(_JERKS))
+    for _ in range(_ROUNDS):
+        shares = softmax(evidences + np.log(shares)[:, None], axis=0).mean(axis=1)
+        shares = np.maximum(shares, _RAREST)
+    return logsumexp(evidences + np.log(shares)[:, None], axis=0).sum(axis=0), shares
 
 
 def estimated(window: Window, drive: Drive) -> tuple[Array, Array, Array]:
@@ -85,18 +92,27 @@ def estimated(window: Window, drive: Drive) -> tuple[Array, Array, Array]:
     return speeds, (shares * (covariances + off @ off.mT)).sum(axis=0), with_place
 
 
-def _fit(window: Window, noise: Array | float, jerk: Array) -> tuple[Array, Array, Array, Array]:
+def _fit(window: Window, noise: Array, jerk: Array) -> tuple[Array, Array, Array, Array]:
     """Log evidence (T, 3) of `noise` (3,) times the variances and of a density (3,); speed and acceleration
     (T, 3, 2, 1) with covariance (T, 3, 2, 2), if they are so, and what they take from each place (T, 3, 2, K).
     """
-    A, y, P = window.basis, window.places, _USUAL[..., None] ** 2 * np.eye(3)
-    N = np.reshape(noise, (-1, 1, 1)) * window.noise + (jerk**2)[:, None, None] * window.wander
-    S = A @ P @ A.mT + N
-    inverse = np.linalg.inv(S)
-    evidence = -0.5 * ((y.mT @ inverse @ y)[..., 0, 0] + np.linalg.slogdet(S)[1])
-    gain = (P @ A.mT @ inverse)[..., 1:, :]
+    A = window.basis
+    evidence, N, inverse = _evidence(window, noise, jerk)
+    gain = (_PRIOR @ A.mT @ inverse)[..., 1:, :]
     left = np.eye(3)[1:] - gain @ A
-    return evidence, gain @ y, left @ P @ left.mT + gain @ N @ gain.mT, gain
+    return evidence, gain @ window.places, left @ _PRIOR @ left.mT + gain @ N @ gain.mT, gain
+
+
+def _evidence(window: Window, noise: Array | float, jerk: Array) -> tuple[Array, Array, Array]:
+    """As `_fit`: log evidence (T, 3), covariance (T, 3, K, K) of the places if the motion in their middle is known, and
+    the inverse of what it is if that is not.
+    """
+    A, y = window.basis, window.places
+    N = np.reshape(noise, (-1, 1, 1)) * window.noise + (jerk**2)[:, None, None] * window.wander
+    S = A @ _PRIOR @ A.mT + N
+    inverse = np.linalg.inv(S).astype(np.float64, copy=False)
+    evidence: Array = -0.5 * ((y.mT @ inverse @ y)[..., 0, 0] + np.linalg.slogdet(S)[1])
+    return evidence, N, inverse
 
 
 def _wander(t: Array) -> Array:

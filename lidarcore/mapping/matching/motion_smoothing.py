@@ -69,18 +69,20 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     since = stamps[there] - stamps[:, None] + h[there, 0] - h
     told = (at == there) & on[there] & (np.abs(since) < PAUSE)
     known = on & (h[:, 0] > 0) & (told.sum(axis=1) > 1)
+    if not known.any():
+        return poses, motions
     matched = np.array([one.variances for one in motions])
-    matched[0] = matched[
-        min(1, len(motions) - 1)
-    ]  # the first scan, which is the map, was matched with nothing
+    matched[0] = matched[min(1, len(motions) - 1)]  # the first scan is the map: it was matched with nothing
     variances = np.minimum(matched, [one.own for one in motions])
     laid = compose(poses, _covered(removed, h))
+
+    def around(means: Array) -> Window:
+        return Window.of(told, since, h, relative(means[:, None], means[there]), variances[there])
+
+    drive = Drive.of(around(laid))
     means, shown = laid, removed
     for _ in range(_ROUNDS):
-        places = relative(means[:, None], means[there])
-        window = Window.of(told, since, h, places, variances[there])
-        drive = Drive.of(window)
-        rates, spread, with_place = estimated(window, drive)
+        rates, spread, with_place = estimated(around(means), drive)
         rates[:, 1, :2] -= rates[:, 0, 2:] * left_of(rates[:, 0, :2])  # as the sensor has them, which turns
         shown = np.where(known[:, None, None], rates, removed)
         means = compose(laid, np.einsum("tijk,tik->tj", shift, shown - removed))
