@@ -23,18 +23,20 @@ _ROUNDS = 20  # of expectation maximisation
 
 
 class Window(NamedTuple):
-    """K places around each of T times, each dimension on its own.
+    """K places around each of T times, one of them at the time itself; each dimension on its own.
 
     basis   (T, 1, K, 3) of place, speed and acceleration at the time
     noise   (T, 3, K, K) covariance of the places
     wander  (T, 1, K, K) covariance of where white jerk of density 1 has led
     places  (T, 3, K, 1) m, m, rad
+    own     (T, 1, K) 1 for the place at the time itself, 0 for the others
     """
 
     basis: Array
     noise: Array
     wander: Array
     places: Array
+    own: Array
 
     @classmethod
     def of(cls, told: Bools, t: Array, h: Array, places: Array, variances: Array) -> "Window":
@@ -42,18 +44,19 @@ class Window(NamedTuple):
         basis = np.stack([np.ones_like(t), t, t**2 / 2 + h**2 / 6], -1) * told[..., None]
         noise = np.swapaxes(np.where(told[..., None], variances, 1.0), 1, 2)[..., None] * np.eye(t.shape[1])
         given = np.swapaxes(np.where(told[..., None], places, 0.0), 1, 2)[..., None]
-        return cls(basis[:, None], noise, _wander(np.where(told, t, 0.0))[:, None], given)
+        own = np.where(t == 0, 1.0, 0.0)[:, None]
+        return cls(basis[:, None], noise, _wander(np.where(told, t, 0.0))[:, None], given, own)
 
 
 class Drive(NamedTuple):
     """What the places of a whole drive say of it.
 
-    noise   (3,) times the variances of the places, which is what explains them best: poses of scans on one map share
-            its errors, which are no noise from one to the next
+    noise   times the variances of the places, which is what explains them best: poses of scans on one map share its
+            errors, which are no noise from one to the next; one factor, as the same surfaces tell all dimensions
     shares  (J, 3) how often each density of the jerk explains them best
     """
 
-    noise: Array
+    noise: float
     shares: Array
 
     @classmethod
@@ -61,39 +64,37 @@ class Drive(NamedTuple):
         """By some of its times, maximum likelihood of both together: one of them alone takes the other's place."""
         some = Window(*(column[:: -(-len(window.places) // _ENOUGH)] for column in window))
         likelihoods, shares = zip(*(_most_likely(some, noise) for noise in _NOISES), strict=True)
-        best = np.argmax(likelihoods, axis=0)
-        return cls(_NOISES[best], np.array(shares)[best, :, np.arange(3)].T)
+        best = int(np.argmax(likelihoods))
+        return cls(float(_NOISES[best]), shares[best])
 
 
-def _most_likely(window: Window, noise: float) -> tuple[Array, Array]:
-    """Log-likelihood (3,) of `noise` times the variances, with the shares (J, 3) of densities that make it largest."""
+def _most_likely(window: Window, noise: float) -> tuple[float, Array]:
+    """Log-likelihood of `noise` times the variances, with the shares (J, 3) of densities that make it largest."""
     evidences = np.array([_evidence(window, noise, jerk)[0] for jerk in _JERKS])
     shares = np.full((len(_JERKS), 3), 1 / len(_JERKS))
     for _ in range(_ROUNDS):
         shares = softmax(evidences + np.log(shares)[:, None], axis=0).mean(axis=1)
         shares = np.maximum(shares, _RAREST)
-    return logsumexp(evidences + np.log(shares)[:, None], axis=0).sum(axis=0), shares
+    return float(logsumexp(evidences + np.log(shares)[:, None], axis=0).sum()), shares
 
 
 def estimated(window: Window, drive: Drive) -> tuple[Array, Array, Array]:
     """Speeds and accelerations (T, 2, 3) with covariances (T, 3, 2, 2): each jerk counts as it explains the places.
 
-    The third, (T, 2, 3), are their covariances with the error of the middle one of the places, by which they are told.
+    The third, (T, 2, 3), are their covariances with the error of the place at the time itself.
     """
     fits = [_fit(window, drive.noise, jerk) for jerk in _JERKS]
     evidences, rates, covariances, gains = (np.stack(column) for column in zip(*fits, strict=True))
     shares = softmax(evidences + np.log(drive.shares)[:, None], axis=0)[..., None, None]
     mean = (shares * rates).sum(axis=0)
     off = rates - mean
-    middle = window.noise.shape[-1] // 2
-    error = drive.noise * window.noise[..., middle, middle]
-    shared = (shares * gains[..., middle : middle + 1]).sum(axis=0)[..., 0] * error[..., None]
+    shared = ((shares * gains).sum(axis=0) @ (drive.noise * window.noise) @ window.own[..., None])[..., 0]
     speeds, with_place = (np.swapaxes(rows, 1, 2).copy() for rows in (mean[..., 0], shared))
     return speeds, (shares * (covariances + off @ off.mT)).sum(axis=0), with_place
 
 
-def _fit(window: Window, noise: Array, jerk: Array) -> tuple[Array, Array, Array, Array]:
-    """Log evidence (T, 3) of `noise` (3,) times the variances and of a density (3,); speed and acceleration
+def _fit(window: Window, noise: float, jerk: Array) -> tuple[Array, Array, Array, Array]:
+    """Log evidence (T, 3) of `noise` times the variances and of a density (3,); speed and acceleration
     (T, 3, 2, 1) with covariance (T, 3, 2, 2), if they are so, and what they take from each place (T, 3, 2, K).
     """
     A = window.basis
@@ -103,12 +104,12 @@ def _fit(window: Window, noise: Array, jerk: Array) -> tuple[Array, Array, Array
     return evidence, gain @ window.places, left @ _PRIOR @ left.mT + gain @ N @ gain.mT, gain
 
 
-def _evidence(window: Window, noise: Array | float, jerk: Array) -> tuple[Array, Array, Array]:
+def _evidence(window: Window, noise: float, jerk: Array) -> tuple[Array, Array, Array]:
     """As `_fit`: log evidence (T, 3), covariance (T, 3, K, K) of the places if the motion in their middle is known, and
     the inverse of what it is if that is not.
     """
     A, y = window.basis, window.places
-    N = np.reshape(noise, (-1, 1, 1)) * window.noise + (jerk**2)[:, None, None] * window.wander
+    N = noise * window.noise + (jerk**2)[:, None, None] * window.wander
     S = A @ _PRIOR @ A.mT + N
     inverse = np.linalg.inv(S).astype(np.float64, copy=False)
     evidence: Array = -0.5 * ((y.mT @ inverse @ y)[..., 0, 0] + np.linalg.slogdet(S)[1])

@@ -8,13 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import compose, inverse, left_of, relative, rotate
 from lidarcore.mapping.matching.jerk import Drive, Window, estimated
 from lidarcore.mapping.matching.sweep import PAUSE
 
-_AROUND = np.arange(-3, 4)
-"""Scans that tell the speed."""
+_AROUND = (
+    7  # scans that tell the speed: at an end, too, where those nearest to it would not tell how steady it is
+)
 _ROUNDS = 3  # a wrong speed shifts scans, from which it is told: a tenth of it comes back
 
 
@@ -64,10 +65,9 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     on = np.array([one.on for one in motions])
     removed = np.stack([[*one.velocity, *one.acceleration] for one in motions]).reshape(-1, 2, 3)
     shift = np.array([one.shift for one in motions])
-    at = np.arange(len(stamps))[:, None] + _AROUND
-    there = np.clip(at, 0, len(stamps) - 1)
+    there, is_one = _around(stamps)
     since = stamps[there] - stamps[:, None] + h[there, 0] - h
-    told = (at == there) & on[there] & (np.abs(since) < PAUSE)
+    told = is_one & on[there] & (np.abs(since) < PAUSE)
     known = on & (h[:, 0] > 0) & (told.sum(axis=1) > 1)
     if not known.any():
         return poses, motions
@@ -104,6 +104,15 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
         for k, one in enumerate(motions)
     ]
     return now, after
+
+
+def _around(stamps: Array) -> tuple[Ints, Bools]:
+    """Numbers (T, 7) of the scans that tell the speed of each, none beyond a pause, and which of these are any."""
+    runs = np.cumsum(np.append(0, np.diff(stamps) >= PAUSE))
+    first, end = np.searchsorted(runs, runs), np.searchsorted(runs, runs, "right")
+    begin = np.maximum(np.minimum(np.arange(len(stamps)) - _AROUND // 2, end - _AROUND), first)
+    at = begin[:, None] + np.arange(_AROUND)
+    return np.minimum(at, len(stamps) - 1), at < end[:, None]
 
 
 def _covered(rates: Array, h: Array) -> Array:
