@@ -132,7 +132,7 @@ def test_the_first_scan_is_as_far_off_as_its_own_place_and_the_speed_that_this_t
 
 
 def test_scans_on_a_map_of_few_claim_its_noise_but_tell_speeds_as_well_as_others():
-    """300 drives as above, but of a speed that wanders as that of the steadiest drives does that are expected.
+    """150 drives as above, but of a speed that wanders as that of the steadiest drives does that are expected.
 
     The first scan is the map, and those after it lie on the noise of that one alone. As if neighbours did not share
     that, squares were half as large as claimed.
@@ -145,7 +145,7 @@ def test_scans_on_a_map_of_few_claim_its_noise_but_tell_speeds_as_well_as_others
         for one, matched in zip(motions(np.tile(steady, (len(T), 1))), worse, strict=True)
     ]
     squares = []
-    for _ in range(300):
+    for _ in range(150):
         growing = np.cumsum(rng.normal(0, 0.1 * np.sqrt(fine), 410))  # m/s²: jerk of .1 m/s³ in a second
         speed = 0.5 + np.cumsum(growing) * fine
         x = np.cumsum(speed) * fine
