@@ -105,8 +105,8 @@ def _fit(window: Window, noise: float, jerk: Array) -> tuple[Array, Array, Array
 
 
 def _evidence(window: Window, noise: float, jerk: Array) -> tuple[Array, Array, Array]:
-    """As `_fit`: log evidence (T, 3), covariance (T, 3, K, K) of the places if the motion in their middle is known, and
-    the inverse of what it is if that is not.
+    """As `_fit`: log evidence (T, 3), covariance (T, 3, K, K) of the places if the motion at the time is known, and the
+    inverse of what it is if that is not.
     """
     A, y = window.basis, window.places
     N = noise * window.noise + (jerk**2)[:, None, None] * window.wander

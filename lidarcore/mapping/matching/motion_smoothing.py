@@ -13,9 +13,8 @@ from lidarcore.geometry import compose, inverse, left_of, relative, rotate
 from lidarcore.mapping.matching.jerk import Drive, Window, estimated
 from lidarcore.mapping.matching.sweep import PAUSE
 
-_AROUND = (
-    7  # scans that tell the speed: at an end, too, where those nearest to it would not tell how steady it is
-)
+_SCANS = 7
+"""Scans that tell a speed: as many at an end, where those nearest to it would not tell how steady the drive is."""
 _ROUNDS = 3  # a wrong speed shifts scans, from which it is told: a tenth of it comes back
 
 
@@ -65,9 +64,9 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     on = np.array([one.on for one in motions])
     removed = np.stack([[*one.velocity, *one.acceleration] for one in motions]).reshape(-1, 2, 3)
     shift = np.array([one.shift for one in motions])
-    there, is_one = _around(stamps)
+    there, exist = _beside(stamps)
     since = stamps[there] - stamps[:, None] + h[there, 0] - h
-    told = is_one & on[there] & (np.abs(since) < PAUSE)
+    told = exist & on[there] & (np.abs(since) < PAUSE)
     known = on & (h[:, 0] > 0) & (told.sum(axis=1) > 1)
     if not known.any():
         return poses, motions
@@ -106,12 +105,12 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     return now, after
 
 
-def _around(stamps: Array) -> tuple[Ints, Bools]:
-    """Numbers (T, 7) of the scans that tell the speed of each, none beyond a pause, and which of these are any."""
+def _beside(stamps: Array) -> tuple[Ints, Bools]:
+    """Numbers (T, 7) of the scans that tell the speed of each, and which of them exist: none beyond a pause does."""
     runs = np.cumsum(np.append(0, np.diff(stamps) >= PAUSE))
     first, end = np.searchsorted(runs, runs), np.searchsorted(runs, runs, "right")
-    begin = np.maximum(np.minimum(np.arange(len(stamps)) - _AROUND // 2, end - _AROUND), first)
-    at = begin[:, None] + np.arange(_AROUND)
+    begin = np.maximum(np.minimum(np.arange(len(stamps)) - _SCANS // 2, end - _SCANS), first)
+    at = begin[:, None] + np.arange(_SCANS)
     return np.minimum(at, len(stamps) - 1), at < end[:, None]
 
 
