@@ -39,13 +39,16 @@ class Known(NamedTuple):
 def known(joint: JointPoses, within: float) -> Known:
     """The parts of a way; two are known if the place of one, seen from the other, has a deviation below `within` m."""
     part = np.arange(len(joint.poses)) // _TOGETHER
-    middles = np.minimum(np.arange(part[-1] + 1) * _TOGETHER + _TOGETHER // 2, len(part) - 1).tolist()
-    pairs = np.eye(len(middles), k=-1, dtype=bool) | np.eye(len(middles), dtype=bool)
-    for b, j in enumerate(middles):
-        for a, i in enumerate(middles[: max(0, b - 1)]):
-            P = joint.relative(i, j)[1]
-            pairs[b, a] = P[0, 0] + P[1, 1] < within**2
-    return Known(part, pairs | pairs.T)
+    distance = np.abs(np.subtract.outer(np.arange(part[-1] + 1), np.arange(part[-1] + 1)))
+    return known_besides(Known(part, distance <= 1), joint, within)
+
+
+def known_besides(parts: Known, joint: JointPoses, within: float) -> Known:
+    """The same parts, of which those are known that were before, and those that the joint poses know now."""
+    pairs = parts.pairs.copy()
+    for b, a in np.argwhere(np.tril(~pairs)).tolist():
+        pairs[b, a] = pairs[a, b] = _is_known(joint, _middle(parts, a), _middle(parts, b), within)
+    return parts._replace(pairs=pairs)
 
 
 def near_unknown(joint: JointPoses, known: Known, distance: float) -> Ints:
@@ -56,6 +59,15 @@ def near_unknown(joint: JointPoses, known: Known, distance: float) -> Ints:
         if (np.hypot(*(others - place).T) < distance).any():
             found.append(k)
     return np.array(found, np.int64)
+
+
+def _middle(parts: Known, number: int) -> int:
+    return min(number * _TOGETHER + _TOGETHER // 2, len(parts.part) - 1)
+
+
+def _is_known(joint: JointPoses, i: int, j: int, within: float) -> bool:
+    P = joint.relative(i, j)[1]
+    return bool(P[0, 0] + P[1, 1] < within**2)
 
 
 @kernel

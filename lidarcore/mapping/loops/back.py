@@ -8,7 +8,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.geometry import compose, pose_difference, relative, squared_mahalanobis
 from lidarcore.mapping.doubt import DOUBTFUL
-from lidarcore.mapping.graph.known import Known, known, near_unknown
+from lidarcore.mapping.graph.known import Known, known, known_besides, near_unknown
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Refined, Step, refine
 from lidarcore.mapping.loops.closure import LoopFinder
@@ -130,14 +130,24 @@ class BackEnd:
         return self._close(loops)
 
     def refine(self) -> Refined:
-        """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped."""
+        """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped.
+
+        Passes that the graph does not know, seen from each other, are adjusted apart first, and together only if that
+        says where they lie: else surfaces would be taken for the same ones that are not, and the map be wrong and sure.
+        """
         self.graph.optimize()
-        refined = self._refined()
-        self.graph.move(refined.poses)
+        parts = known(self.graph, self._settings.front.match.reach)
+        while True:
+            refined = self._refined(parts)
+            self.graph.move(refined.poses)
+            more = known_besides(parts, refined, self._settings.front.match.reach)
+            if np.array_equal(more.pairs, parts.pairs):
+                break
+            parts = more
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
         return refined
 
-    def _refined(self, parts: Known | None = None) -> Refined:
+    def _refined(self, parts: Known) -> Refined:
         match, sweeps = self._settings.front.match, [keyframe.sweep for keyframe in self.keyframes.values()]
         return refine(
             [keyframe.patches for keyframe in self.keyframes.values()],
