@@ -68,7 +68,13 @@ def test_what_no_pose_is_near_to_is_left_out():
 
 
 @pytest.mark.parametrize(
-    ("text", "word"), [("1 2 3\n", "eight numbers"), ("a b\n", "not a file"), (8 * "nan ", "eight numbers")]
+    ("text", "word"),
+    [
+        ("1 2 3\n", "eight numbers"),
+        ("a b\n", "not a file"),
+        ("1 b\n", r"column 2\.$"),
+        (8 * "nan ", "eight numbers"),
+    ],
 )
 def test_what_is_no_file_of_relations_is_refused(tmp_path, text, word):
     (tmp_path / "wrong").write_text(text)

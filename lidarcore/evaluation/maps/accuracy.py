@@ -96,7 +96,8 @@ def read_relations(path: Path) -> Relations:
         with opened(path, "rt") as file:
             table = np.loadtxt(file, ndmin=2)
     except ValueError as error:
-        raise EvaluationError(f"{path.name} is not a file of relations: {error}.") from error
+        reason = str(error).rstrip(".")
+        raise EvaluationError(f"{path.name} is not a file of relations: {reason}.") from error
     if table.shape[1] != 8 or not np.isfinite(table).all():
         raise EvaluationError(
             f"{path.name} should have eight numbers in each row: t1 t2 dx dy dz roll pitch yaw."
