@@ -111,7 +111,7 @@ def place(
     server: Server,
     pose: Annotated[InitialPose, Body(examples=[{"x": 1.0, "y": 0.5, "heading": 0.0}])],
 ) -> LocalizationStatus:
-    """Tell where the sensor is. 409 if nothing is localized, or the map is made of whole scans."""
+    """Tell where the sensor is. 409 if nothing is localized, or SLAM builds a map of whole scans."""
     variances = [pose.sigma_position**2, pose.sigma_position**2, pose.sigma_heading**2]
     covariance = np.diag(variances) if pose.covariance is None else np.array(pose.covariance)
     wanted, at = server.runtime.settings.navigation, (pose.x, pose.y, pose.heading)
