@@ -5,7 +5,17 @@ from typing import Annotated
 
 import typer
 
-from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, plural, settings_from, to_file
+from .options import (
+    RecordingPath,
+    Set,
+    SettingsFile,
+    Topic,
+    check_folder,
+    plural,
+    settings_from,
+    tell_notes,
+    to_file,
+)
 from .progress import counting
 
 
@@ -46,8 +56,10 @@ def localize(
         format_of(save_map)
         check_folder(save_map, "--save-map")
     tracker = tracker_in(known, chosen)
+    opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans") as count:
-        outcome = track(open_recording(recording, topic, chosen.sensor.mask), tracker, chosen, count)
+        outcome = track(opened, tracker, chosen, count)
+    tell_notes(opened)
     if output is not None:
         files.write(output, csv_text(outcome.columns))
     if save_map is not None and outcome.landmarks is not None:

@@ -13,7 +13,17 @@ from .evaluate import evaluate
 from .experiment import experiment
 from .localize import localize
 from .map import map_recording
-from .options import RecordingPath, Set, SettingsFile, Topic, check_folder, plural, settings_from, to_file
+from .options import (
+    RecordingPath,
+    Set,
+    SettingsFile,
+    Topic,
+    check_folder,
+    plural,
+    settings_from,
+    tell_notes,
+    to_file,
+)
 from .progress import counting
 from .record import record
 from .serve import serve
@@ -61,14 +71,10 @@ def process(
     check_folder(output)
     chosen = settings_from(settings, set_)
     fitters = [chosen.patched({"extraction": {"fitter": name}}).extraction.fitter for name in fitter or []]
+    opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans") as count:
-        counts = run(
-            open_recording(recording, topic, chosen.sensor.mask),
-            output,
-            chosen.extraction,
-            fitters or [chosen.extraction.fitter],
-            count,
-        )
+        counts = run(opened, output, chosen.extraction, fitters or [chosen.extraction.fitter], count)
+    tell_notes(opened)
     found = f"{plural(counts.segments, 'segment')} and {plural(counts.corners, 'corner')}"
     typer.echo(f"{output}: {found} of {plural(counts.scans, 'scan')}")
 

@@ -13,6 +13,7 @@ from .options import (
     check_new_folder,
     plural,
     settings_from,
+    tell_notes,
 )
 from .progress import counting
 
@@ -40,6 +41,7 @@ def map_recording(
     opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans") as count:
         built = build(opened, chosen, count)
+    tell_notes(opened)
     walls = write_files(output, built, chosen)
     typer.echo(
         f"{output}: {plural(len(built.states), 'scan')}, {built.states.count('tracking')} of them tracked; "

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from lidarcore.recordings import Recording
+
     from ..pipeline.settings import Settings
 
 RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
@@ -89,6 +91,12 @@ def _check_writable(folder: Path, path: Path, option: str) -> None:
 def plural(number: int, noun: str) -> str:
     """'1 scan', '2 scans'."""
     return f"{number} {noun}" + ("" if number == 1 else "s")
+
+
+def tell_notes(recording: "Recording") -> None:
+    """What was found and handled in a recording that was read, on stderr."""
+    for note in recording.notes:
+        typer.echo(f"{recording.path.name}: {note}", err=True)
 
 
 def check_output(file: Path | None, *formats: str) -> None:
