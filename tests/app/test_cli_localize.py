@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from processes import assert_refused, run
+from serving import ROOT
 
 from lidarcore import Scan
 from lidarcore.geometry import compose, inverse
@@ -85,3 +86,26 @@ def test_what_cannot_be_is_said_in_a_sentence(
     recording: Path, arguments: tuple[str, ...], words: str
 ) -> None:
     assert_refused(run("localize", recording, *arguments), words)
+
+
+@pytest.mark.parametrize("command", [("map", "-o", "out"), ("localize",), ("process", "-o", "out.csv")])
+def test_what_was_cut_short_is_noted_once_on_stderr(command: tuple[str, ...], tmp_path: Path) -> None:
+    whole = (ROOT / "app" / "demo" / "emulated-s1.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 4])
+    name, *output = command
+    output = [str(tmp_path / part) if part.startswith("out") else part for part in output]
+    result = run(name, tmp_path / "cut.mcap", *output)
+    assert result.returncode == 0, result.stderr
+    (note,) = result.stderr.splitlines()
+    assert note.startswith("cut.mcap: The MCAP file is damaged or cut short")
+
+
+def test_a_map_of_ranges_in_millimetres_says_to_check_the_unit(tmp_path: Path) -> None:
+    rows = [f"{stamp},-2,0.02," + ",".join(["4012.5"] * 200) for stamp in range(5)]
+    head = "t,angle_min,angle_increment," + ",".join(f"r{beam}" for beam in range(200))
+    (tmp_path / "mm.csv").write_text("\n".join([head, *rows]) + "\n")
+    result = run("map", tmp_path / "mm.csv", "-o", tmp_path / "map")
+    assert result.returncode == 2
+    assert "no scan has a return" in result.stderr
+    assert "Check that ranges are in metres; `lidarcore info` shows them." in result.stderr
+    assert not (tmp_path / "map").exists()

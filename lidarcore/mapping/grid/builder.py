@@ -48,11 +48,14 @@ class GridBuilder:
         mark_scan(self._odds, self._marks, self._mark, ends, start, self._evidence)
 
     def grid(self) -> OccupancyGrid:
-        """The grid as it is now, just large enough. Raises GridError if no scan was added."""
+        """The grid as it is now, just large enough. Raises GridError if no scan with a return was added."""
         seen = self._odds != 0
         rows, columns = np.flatnonzero(seen.any(axis=1)), np.flatnonzero(seen.any(axis=0))
         if not len(rows):
-            raise GridError("The grid is empty: add scans that have returns.")
+            raise GridError(
+                f"The grid is empty: no scan has a return within {self.settings.max_range:g} m. "
+                "Check that ranges are in metres; `lidarcore info` shows them."
+            )
         part = self._odds[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
         cells = np.where(part > 0, OCCUPIED, np.where(part < 0, FREE, UNKNOWN)).astype(np.int8)
         corner = (self._low + np.array([columns[0], rows[0]])) * self.settings.resolution
