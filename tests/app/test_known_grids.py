@@ -125,6 +125,19 @@ def test_a_zip_that_holds_no_map_is_refused_and_leaves_nothing(
     assert shared_server.get("/sessions")["sessions"] == before
 
 
+@pytest.mark.parametrize("declared", ["application/zip", "Application/Zip; charset=binary"])
+def test_a_body_is_of_the_format_that_it_is_declared_to_have(
+    shared_server: Server, ros_map: Path, declared: str
+) -> None:
+    body = packed(("hall.yaml", ros_map.read_bytes()), ("hall.pgm", ros_map.with_suffix(".pgm").read_bytes()))
+    answer = shared_server.http.post("/map", content=body, headers={"Content-Type": declared})
+    assert (answer.status_code, answer.json()["grid"]) == (201, True)
+    as_json = shared_server.http.post(
+        "/map", params={"format": "json"}, content=body, headers={"Content-Type": declared}
+    )
+    assert "json cannot be read" in assert_problem(as_json, 422)["detail"]  # what is asked for counts
+
+
 def test_bytes_that_are_no_zip_are_refused(shared_server: Server) -> None:
     answer = shared_server.http.post("/map", params={"format": "zip"}, content=b"not a zip")
     assert "zip cannot be read" in assert_problem(answer, 422)["detail"]

@@ -90,11 +90,12 @@ async def upload(
     server: Server,
     request: Request,
     format: Annotated[
-        Literal["json", "csv", "geojson", "zip"],
+        Literal["json", "csv", "geojson", "zip"] | None,
         Query(
-            description="of the body; zip: a grid, map.yaml with its image as ROS and `lidarcore map` write them"
+            description="of the body, by its Content-Type or else JSON if not given; zip: a grid, map.yaml with its "
+            "image as ROS and `lidarcore map` write them"
         ),
-    ] = "json",
+    ] = None,
     name: Annotated[
         str, Query(min_length=1, max_length=200, description="what the session is said to come from")
     ] = "a file",
@@ -105,14 +106,21 @@ async def upload(
     """
     if not name.isprintable():
         raise ProblemError(422, f"name is {name!r}: give printable text.")
+    sent = format or _format_of(request)
     with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder:
-        path = Path(folder) / f"map.{format}"
+        path = Path(folder) / f"map.{sent}"
         with path.open("xb") as file:
             async for chunk in request.stream():
                 if file.tell() + len(chunk) > MAX_BYTES:
                     raise ProblemError(413, f"The map is larger than {MAX_BYTES} bytes.")
                 file.write(chunk)
-        return await run_in_threadpool(server.landmarks.load, path, format, name)
+        return await run_in_threadpool(server.landmarks.load, path, sent, name)
+
+
+def _format_of(request: Request) -> str:
+    """The format that the body is declared to have: one of FILES, JSON if it is none of them."""
+    declared = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+    return next((name for name, type_ in MEDIA_TYPES.items() if type_ == declared and type_ in FILES), "json")
 
 
 def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution: float) -> FileResponse:
