@@ -6,6 +6,7 @@ A format is one module of this package with one subclass of Recording; it is fou
 import inspect
 import os
 import pkgutil
+import re
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -23,6 +24,10 @@ __all__ = [
     "RecordingWriter",
     "open_recording",
 ]
+
+
+_MAP = re.compile(rb"\AP[25]\s|^(image|occupied_thresh):", re.MULTILINE)
+"""In the beginning of a map's image, or of the YAML beside it."""
 
 
 def _formats() -> tuple[type[Recording], ...]:
@@ -75,6 +80,11 @@ def open_recording(
         return recording
     if path.is_dir():
         raise RecordingError(f"The directory {path} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
+    if _MAP.search(head):
+        raise RecordingError(
+            f"{path.name} looks like a map, not like a recording: load it in the page by Map › Load a file, "
+            "or localize a recording in it by `lidarcore localize --map`."
+        )
     known = ", ".join(format_.name for format_ in FORMATS)
     raise RecordingError(
         f"{path.name} is in none of the known formats: {known}. Anything else can be saved "

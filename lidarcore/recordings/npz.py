@@ -25,6 +25,11 @@ class NpzArchive(ArrayRecording):
         with self._seekable() as file, zipfile.ZipFile(file) as archive:
             names = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
             chosen = {name: info for name, info in names.items() if wanted(name)}
+            if names and not chosen and not any(name.endswith(".npy") for name in archive.namelist()):
+                raise self._error(
+                    "is a zip of other files, not of NumPy arrays: unpack it and open what is in it. "
+                    "Of a ROS 2 bag that is its folder, or in the page its .db3 or .mcap file."
+                )
             self._check_sizes(chosen.values())
             return {name: self._array(archive, info) for name, info in chosen.items()}
 

@@ -3,6 +3,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ from real_recordings import each, where
 
 from lidarcore.errors import RecordingError, TopicError
 from lidarcore.files.streams import read_head
+from lidarcore.mapping.grid import build_grid, write_ros_map
 from lidarcore.recordings import FORMATS, open_recording
+from lidarcore.scan import Scan
 
 RECORDINGS = {
     "brenner_lego_arena_groundtruth/robot4_scan.txt": "LEGO robot log",
@@ -120,6 +123,9 @@ def test_packed_files_read_as_the_unpacked(tmp_path, name):
             lambda folder: written(folder / "letter.txt", b"Dear robot,\n"),
             "saved with numpy.savez as a .npz: ranges",
         ),
+        (lambda folder: zipped_bag(folder / "drive.zip"), "a zip of other files.*unpack it.*ROS 2 bag"),
+        (lambda folder: ros_map(folder / "hall.yaml"), "hall.yaml looks like a map.*Map › Load a file"),
+        (lambda folder: ros_map(folder / "hall.yaml").with_suffix(".pgm"), "hall.pgm looks like a map"),
         (lambda folder: fifo(folder / "pipe"), "There is no file"),
     ],
 )
@@ -130,6 +136,19 @@ def test_what_is_no_recording_gets_a_clear_error(tmp_path, make, text):
 
 def written(path: Path, content: bytes) -> Path:
     path.write_bytes(content)
+    return path
+
+
+def zipped_bag(path: Path) -> Path:
+    demo = Path(__file__).parents[2] / "app" / "demo" / "emulated-s1.mcap"
+    with ZipFile(path, "w") as archive:
+        archive.writestr("drive/metadata.yaml", "rosbag2_bagfile_information:\n")
+        archive.write(demo, "drive/drive_0.mcap")
+    return path
+
+
+def ros_map(path: Path) -> Path:
+    write_ros_map(build_grid([Scan([2.0, 3.0], [0.0, 0.1])], np.zeros((1, 3))), path)
     return path
 
 
