@@ -167,17 +167,20 @@ def _decompressors() -> dict[str, Any]:
     return {"bz2": bz2.BZ2Decompressor, "lz4": LZ4FrameDecompressor, "zstd": zstd.ZstdDecompressor}
 
 
-def lines(stream: IO[bytes], remark: Callable[[str], None]) -> Iterator[bytes]:
-    """Yield the lines of a text. The last one is left out if it does not end: nobody knows what it lacks.
+def lines(
+    stream: IO[bytes], remark: Callable[[str], None], is_whole: Callable[[bytes], bool] = lambda _: False
+) -> Iterator[bytes]:
+    """Yield the lines of a text. The last one is left out if it does not end, unless `is_whole` says it lacks nothing.
 
+    A number that was cut looks like one: only a format knows how many digits there should be.
     Raises RecordingError if a line is endless.
     """
     while line := stream.readline(MAX_LINE):
-        if line.endswith(b"\n"):
-            yield line
-        elif len(line) == MAX_LINE:
+        if not line.endswith(b"\n") and len(line) == MAX_LINE:
             raise RecordingError(
                 f"A line is longer than {MAX_LINE // MEBIBYTE} MiB: this is not a text recording."
             )
+        if line.endswith(b"\n") or is_whole(line):
+            yield line
         else:
             remark("The last line does not end: left out.")

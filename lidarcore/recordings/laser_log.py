@@ -62,6 +62,7 @@ def sick_bearings(number: int) -> Array:
 class LaserLog(Recording):
     """A text log with one line for each scan, as they were taken: a logger may write some a few lines late.
 
+    A last line that does not end is kept if the format can tell that it is whole, or if it is the only scan.
     Opening reads the file once: for the lidars in it, the marker for no return and the quality of the stamps.
     """
 
@@ -99,15 +100,28 @@ class LaserLog(Recording):
         self._marker = self._find_marker(survey)
         self._stamps = self._settle_stamps(survey.stamps())
 
+    def _is_whole(self, line: bytes) -> bool:
+        """Whether a last line without an end surely lacks nothing, not even digits of its last number."""
+        return False
+
+    def _is_kept(self, line: bytes) -> bool:
+        """Whether a last line without an end is taken: it has to be whole, unless it is all there is."""
+        if self._has_reading:
+            return self._is_whole(line)
+        self._remark("The last line does not end: its last number may be cut.")
+        return True
+
     def _readings(self) -> Iterator[Reading]:
+        self._has_reading = False
         with self._stream() as stream:
-            for line in lines(stream, self._remark):
+            for line in lines(stream, self._remark, self._is_kept):
                 try:
                     reading = self._parse(line.split())
                 except (ValueError, IndexError):
                     self._count("damaged lines left out", 1)
                 else:
                     if reading is not None:
+                        self._has_reading = True
                         yield reading
 
     def _find_marker(self, survey: Survey) -> float:

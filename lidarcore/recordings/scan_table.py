@@ -20,7 +20,13 @@ class ScanTable(LaserLog):
 
     def _open(self, topic: str | None) -> None:
         self._columns: list[bytes] = []
+        self._decimals = 0  # of the last column, at most
         super()._open(topic)
+
+    def _is_whole(self, line: bytes) -> bool:
+        """Whether it has all columns, and as many decimals in the last one as any line before."""
+        cells = line.strip().split(b",")
+        return len(cells) == len(self._columns) and _decimals(cells) >= max(self._decimals, 1)
 
     def _parse(self, words: list[bytes]) -> Reading | None:
         cells = words[0].split(b",")
@@ -28,6 +34,7 @@ class ScanTable(LaserLog):
             self._columns = cells
             return None
         values = numbers(cells, len(self._columns))
+        self._decimals = max(self._decimals, _decimals(cells))
         named = dict(zip(self._columns, values, strict=True))
         ranges = values[self._columns.index(b"r0") :]
         first, step = (named.get(b"angle_" + name) for name in (b"min", b"increment"))
@@ -45,3 +52,8 @@ class ScanTable(LaserLog):
             pose=odometry if np.isfinite(odometry).all() else None,
             truth=corrected if np.isfinite(corrected).all() else None,
         )
+
+
+def _decimals(cells: list[bytes]) -> int:
+    """Digits behind the point of the last number, its exponent included."""
+    return len(cells[-1].partition(b".")[2])

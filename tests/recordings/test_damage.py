@@ -201,3 +201,30 @@ def test_an_old_laser_line_cut_anywhere_is_never_half_read(samples, tmp_path):
     (tmp_path / "a.log").write_bytes(line + b"\n" + line)
     (scan,) = open_recording(tmp_path / "a.log")
     assert len(scan) == 180
+
+
+HEAD = "t,angle_min,angle_increment,r0,r1,r2"
+ROWS = ["0.0,-0.1,0.1,2.25,3.50,4.125", "0.1,-0.1,0.1,2.26,3.51,4.137", "0.2,-0.1,0.1,2.27,3.52,4.149"]
+
+
+def test_a_table_without_a_last_newline_keeps_its_last_scan_unless_a_digit_is_missing(tmp_path):
+    text = "\n".join([HEAD, *ROWS])
+    for cut in range(1, len(ROWS[-1])):
+        (tmp_path / "cut.csv").write_text(text[:-cut])
+        scans, notes = read(tmp_path / "cut.csv")
+        assert len(scans) == 2
+        assert "The last line does not end: left out." in notes
+    (tmp_path / "whole.csv").write_text(text)
+    scans, notes = read(tmp_path / "whole.csv")
+    np.testing.assert_array_equal(scans[-1].ranges, [2.27, 3.52, 4.149])
+    assert len(scans) == 3
+    assert not any("does not end" in note for note in notes)
+
+
+@pytest.mark.parametrize("rows", [[HEAD, ROWS[0]], ["FLASER 3 2.25 3.50 4.125 1 2 0.5 1 2 0.5 7.5 host 7.5"]])
+def test_a_single_scan_without_a_last_newline_is_read_and_noted(tmp_path, rows):
+    (tmp_path / "one.log").write_text("\n".join(rows))
+    recording = open_recording(tmp_path / "one.log")
+    (scan,) = recording
+    np.testing.assert_array_equal(scan.ranges, [2.25, 3.5, 4.125])
+    assert "The last line does not end: its last number may be cut." in recording.notes
