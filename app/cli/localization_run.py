@@ -15,6 +15,7 @@ from lidarcore.mapping import MapPicture, WholeScans
 from lidarcore.mapping.grid import read_ros_map
 from lidarcore.recordings import Recording
 
+from ..pipeline.navigation import SIGMA_HEADING, SIGMA_POSITION
 from ..pipeline.settings import Settings
 
 GRIDS = (".yaml", ".yml")
@@ -68,6 +69,11 @@ def tracker_in(path: Path | None, settings: Settings) -> Navigator | WholeScans:
     with path.open(encoding="utf-8-sig", newline="") as file:
         known = from_stored(read_landmarks(file, format))
     return Navigator(replace(settings.navigation, mode="localize"), known)
+
+
+def place(tracker: Navigator | WholeScans, pose: Sequence[float]) -> None:
+    """Say where the first scan was taken, about: m, m, rad. Raises LocalizationError."""
+    tracker.place(pose, np.diag([SIGMA_POSITION, SIGMA_POSITION, SIGMA_HEADING]) ** 2)
 
 
 def write_map(path: Path, landmarks: Landmarks, method: str) -> None:

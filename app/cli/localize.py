@@ -11,12 +11,15 @@ from .options import (
     SettingsFile,
     Topic,
     check_folder,
+    numbers,
     plural,
     settings_from,
     tell_notes,
     to_file,
 )
 from .progress import counting
+
+_HINT = " If you know where the first scan was taken, give it by --pose."
 
 
 def localize(
@@ -37,6 +40,13 @@ def localize(
             "--save-map", metavar="FILE", help="for the map that SLAM built, in one of these formats"
         ),
     ] = None,
+    pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,HEADING",
+            help="where the first scan was taken in the map of --map, in m, m, rad; without, it is looked for",
+        ),
+    ] = None,
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,
@@ -44,11 +54,14 @@ def localize(
     """Track the sensor through a recording, in a known map or in one of landmarks that is built on the way."""
     if known is not None and save_map is not None:
         raise typer.BadParameter("give --map or --save-map: a known map stays as it is.")
+    if pose is not None and known is None:
+        raise typer.BadParameter("give --pose with --map: SLAM begins where the first scan was taken.")
     from lidarcore import files, open_recording
 
     from ..pipeline.tables import csv_text
-    from .localization_run import format_of, track, tracker_in, write_map
+    from .localization_run import format_of, place, track, tracker_in, write_map
 
+    told = None if pose is None else numbers("--pose", pose, "a pose in m, m, rad", "1.2,-0.5,1.57")
     chosen = settings_from(settings, set_)
     if output is not None:
         check_folder(output)
@@ -56,6 +69,8 @@ def localize(
         format_of(save_map)
         check_folder(save_map, "--save-map")
     tracker = tracker_in(known, chosen)
+    if told is not None:
+        place(tracker, told)
     opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans") as count:
         outcome = track(opened, tracker, chosen, count)
@@ -68,5 +83,5 @@ def localize(
         "" if outcome.landmarks is None else "; " + plural(int(outcome.landmarks.confirmed.sum()), "landmark")
     )
     if not outcome.tracked and outcome.message is not None:
-        typer.echo(f"No pose was found. {outcome.message}")
+        typer.echo(f"No pose was found. {outcome.message}{_HINT if known and told is None else ''}")
     typer.echo(f"{plural(outcome.scans, 'scan')}, {outcome.tracked} of them tracked{found}.")

@@ -23,6 +23,7 @@ from .settings import LiveNavigation, Settings
 from .slam_run import Localization, MapRun, Run
 from .trails import NO_PATHS, Paths, TrackedPose, Trails
 
+SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
 NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
 
 

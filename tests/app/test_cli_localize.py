@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from processes import assert_refused, run
-from serving import ROOT
+from serving import ROOT, write_room
 
-from lidarcore import Scan
+from lidarcore import Scan, open_recording
 from lidarcore.geometry import compose, inverse
+from lidarcore.mapping.grid import build_grid, write_ros_map
 from lidarcore.recordings.writer import RecordingWriter
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
@@ -109,3 +110,34 @@ def test_a_map_of_ranges_in_millimetres_says_to_check_the_unit(tmp_path: Path) -
     assert "no scan has a return" in result.stderr
     assert "Check that ranges are in metres; `lidarcore info` shows them." in result.stderr
     assert not (tmp_path / "map").exists()
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Path:
+    """A recording of a sensor that stands, with the grid of what it sees beside it."""
+    path = write_room(tmp_path / "room.npz", scans=5)
+    scans = list(open_recording(path))
+    write_ros_map(build_grid(scans, np.tile([1.0, -2.0, 0.3], (len(scans), 1))), tmp_path / "map.yaml")
+    return path
+
+
+def test_a_sensor_that_is_told_where_it_is_is_tracked_at_once(room: Path, tmp_path: Path) -> None:
+    localize = ("localize", room, "--map", tmp_path, "-o", tmp_path / "poses.csv")
+    searched = run(*localize)
+    assert "fits in several places of the map" in searched.stdout
+    assert "give it by --pose." in searched.stdout
+    told = run(*localize, "--pose", "1.05,-2.1,0.32")
+    assert "5 scans, 5 of them tracked." in told.stdout, told
+    assert np.abs(poses_of(tmp_path / "poses.csv") - [1.0, -2.0, 0.3]).max() < 0.05
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [(("--pose", "0,0,0"), "with --map"), (("--map", "m.yaml", "--pose", "1,2"), "a pose in m, m, rad")],
+)
+def test_a_pose_that_is_none_or_of_no_map_is_refused(
+    room: Path, arguments: tuple[str, ...], words: str
+) -> None:
+    result = run("localize", room, *arguments)
+    assert result.returncode == 2
+    assert words in result.stderr

@@ -10,7 +10,7 @@ from starlette.responses import Response
 from typing_extensions import TypedDict
 
 from ...errors import NotFoundError
-from ...pipeline.navigation import LocalizationStatus, Navigation
+from ...pipeline.navigation import SIGMA_HEADING, SIGMA_POSITION, LocalizationStatus, Navigation
 from ...pipeline.runtime import Runtime
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
@@ -24,7 +24,6 @@ from .dependencies import Server
 
 router = APIRouter(tags=["localization"], responses=documented(422))
 
-SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
 MOST_POSES = 10_000
 COLUMNS = [field.name for field in fields(TrackedPose)]
 ODOMETRY = {"stamp": 1795255000.1, "x": 1.2, "y": -0.3, "heading": 0.5}
