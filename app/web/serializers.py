@@ -156,6 +156,7 @@ def localization_json(localization: Localization) -> LocalizationJson:
         pose=pose_json(estimate.pose),
         covariance=estimate.covariance.tolist(),
         velocity=None if estimate.velocity is None else tuple(estimate.velocity.tolist()),
+        sideways=None if estimate.velocity is None else estimate.sideways,
         dead_reckoned=None if found.dead_reckoned is None else pose_json(found.dead_reckoned),
         truth=_truth_json(localization.truth),
         landmarks=len(confirmed),

@@ -177,6 +177,7 @@ function stateText(now, problem) {
 function comparison(now) {
   const {
     velocity,
+    sideways,
     dead_reckoned: reckoned,
     truth,
     nis,
@@ -187,8 +188,8 @@ function comparison(now) {
   return [
     velocity && [
       "Speed",
-      `${fixed(velocity[0], 2)}\u2009m/s, ${degrees(velocity[1])}°/s`,
-      "Estimated, with the turn rate",
+      `${fixed(Math.hypot(velocity[0], sideways), 2)}\u2009m/s, ${degrees(velocity[1])}°/s`,
+      "Estimated, in whatever direction, with the turn rate",
     ],
     dof && [
       "NIS",
