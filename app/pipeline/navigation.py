@@ -24,6 +24,7 @@ from .slam_run import Localization, MapRun, Run
 from .trails import NO_PATHS, Paths, TrackedPose, Trails
 
 SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
+Extent = tuple[tuple[float, float], tuple[float, float]]
 NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
 
 
@@ -71,12 +72,16 @@ class MapStore(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class LocalizationStatus:
-    """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what."""
+    """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what.
+
+    `extent` is that of the grid that is localized in, if it is one: from and to along x, then along y, m.
+    """
 
     mode: Literal["off", "localize", "slam"]
     method: Literal["scans", "landmarks"] | None
     session: int | None
     map: int | None
+    extent: Extent | None
     problem: str | None
     odometry: OdometryStatus
 
@@ -128,6 +133,16 @@ class Navigation:
         """Grid and walls, as far as they are known: SLAM from whole scans makes them."""
         run = self._run
         return run.picture if run else None
+
+    @property
+    def extent(self) -> Extent | None:
+        """What is known of the grid that is localized in, m: from and to along x, then along y."""
+        run = self._run
+        known = run.picture.grid.extent if run and run.known is not None and run.picture else None
+        if known is None:
+            return None
+        along_x, along_y = known.round(4).tolist()
+        return tuple(along_x), tuple(along_y)
 
     def choose_map(self, session: int | None) -> None:
         """Localize in the map of that session. Raises UnknownSessionError."""

@@ -116,6 +116,7 @@ class Runtime:
             method=self.navigation.method,
             session=self.navigation.session,
             map=self.navigation.map,
+            extent=self.navigation.extent,
             problem=self.navigation.problem,
             odometry=self.navigation.odometry.status(self._why_not_fed()),
         )

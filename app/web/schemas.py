@@ -128,8 +128,9 @@ class InnovationJson(TypedDict):
 class LocalizationJson(TypedDict):
     """Where the sensor is after this scan, and what the filter made of it.
 
-    `velocity` is m/s ahead and rad/s to the left, `sideways` m/s to the left, both along the axes of the sensor, so that
-    the speed is the hypotenuse of `velocity[0]` and `sideways`; null where odometry moves the filter.
+    `velocity` is m/s ahead and rad/s, `sideways` m/s to the left, as the sensor faces: the speed is the hypotenuse of
+    `velocity[0]` and `sideways`. Both are null where odometry moves the filter.
+
     `landmarks` counts those of the map, `tentative` tells where unconfirmed ones are (m, map frame), `observed` counts
     the points seen; `nis` is chi-square distributed with `dof` degrees of freedom, `nis_band` holds 95 % of it; `truth`
     is what a simulator or a reference says, if there is one.

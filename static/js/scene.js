@@ -4,7 +4,7 @@
 import { $ } from "./dom.js";
 import { setting, toggleSetting } from "./actions.js";
 import { Fading } from "./overlay/fading.js";
-import { framingOf, including, isFramed } from "./overlay/framing.js";
+import { cornersOf, framingOf, including, isFramed } from "./overlay/framing.js";
 import { Look, PlainCamera } from "./overlay/look.js";
 import { letGo } from "./overlay/tools.js";
 import { get, on } from "./store.js";
@@ -47,7 +47,7 @@ export function mountScene(press) {
     requestAnimationFrame(() => setTimeout(() => ($("scene").src = "viser/")));
     stop();
   });
-  for (const key of ["frame", "tools", "mapped", "landmarks"]) on([key], look);
+  for (const key of ["frame", "tools", "mapped", "landmarks", "localization"]) on([key], look);
   window.addEventListener("message", ({ origin, source, data }) => {
     const ours = origin === location.origin && source === $("scene").contentWindow;
     if (ours) handlers.get(data?.type)?.(data);
@@ -82,7 +82,8 @@ function extentOf({ extent, localization }) {
   if (!localization || get("tools").follow) return extent;
   const walls = get("mapped").walls.flatMap(({ ends }) => ends);
   const landmarks = [...(get("landmarks")?.values() ?? [])].map(({ x, y }) => [x, y]);
-  return including(extent, [...walls, ...landmarks]);
+  const grid = get("localization")?.extent ?? [[], []];
+  return including(extent, [...walls, ...landmarks, ...cornersOf(grid)]);
 }
 
 let sheet = null; // as it was measured last

@@ -115,6 +115,16 @@ def test_a_scan_without_returns_says_nothing():
         builder.grid()
 
 
+def test_the_extent_is_that_of_what_is_known_however_the_grid_lies():
+    cells = np.full((40, 60), -1)
+    cells[10, 20], cells[29, 49] = OCCUPIED, FREE
+    upright = OccupancyGrid(cells, 0.1, np.array([-1.0, 2.0, 0.0]))
+    np.testing.assert_allclose(upright.extent, [[1, 4], [3, 5]])
+    turned = OccupancyGrid(cells, 0.1, np.array([-1.0, 2.0, np.pi / 2]))
+    np.testing.assert_allclose(turned.extent, [[-4, -2], [4, 7]])
+    assert OccupancyGrid(np.full((3, 3), -1), 0.1, np.zeros(3)).extent is None
+
+
 def test_larger_cells_hold_what_stands_in_any_and_else_what_is_free_in_any():
     rng = np.random.default_rng(4)
     cells = rng.choice([-1, -1, 0, 10, 50, 70, 100], (7, 11), p=[0.3, 0.2, 0.2, 0.1, 0.1, 0.05, 0.05])

@@ -65,6 +65,17 @@ class OccupancyGrid:
         """(H, W) true where nothing stands."""
         return (self.cells >= 0) & (self.cells <= FREE_UP_TO)
 
+    @cached_property
+    def extent(self) -> Array | None:
+        """(2, 2) m: from and to along x, then along y of the world, of what is known; None if nothing is."""
+        known = self.cells != UNKNOWN
+        rows, columns = (np.flatnonzero(known.any(axis=axis)) for axis in (1, 0))
+        if not len(rows):
+            return None
+        sides = [[ends[0], ends[-1] + 1] for ends in (columns, rows)]
+        corners = act(self.origin, self.resolution * np.stack(np.meshgrid(*sides), -1).reshape(-1, 2))
+        return np.stack([corners.min(axis=0), corners.max(axis=0)], 1)
+
     def coarser(self, times: int) -> "OccupancyGrid":
         """The same in cells `times` as large: occupied if something stands in one, else free if one is."""
         short = -np.array(self.cells.shape) % times

@@ -40,7 +40,7 @@ export function isFramed(extent, look, { follow }, { left, right, top, bottom, w
 export const including = (extent, places) =>
   extent.map((ends, axis) => [Math.min, Math.max].map((end, at) => end(ends[at], ...places.map((place) => place[axis]))));
 
-const cornersOf = ([xs, ys]) => xs.flatMap((x) => ys.map((y) => [x, y]));
+export const cornersOf = ([xs, ys]) => xs.flatMap((x) => ys.map((y) => [x, y]));
 
 /** The directions to the right and up on the screen, where `up` (rad) is up. */
 export function axesAt(up) {
