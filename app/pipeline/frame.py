@@ -64,6 +64,12 @@ class Frame:
         """T_world_sensor (3,); the origin where nothing is localized."""
         return AT_ORIGIN if self.localization is None else self.localization.tracking.estimate.pose
 
+    @property
+    def is_placed(self) -> bool:
+        """Whether what is seen lies at the pose; in a known map it does not until it is found there, nor when lost."""
+        found = None if self.localization is None else self.localization.tracking
+        return found is None or found.mode == "slam" or found.state not in ("starting", "lost")
+
     def extent(self) -> Array:
         """Extent (2, 2) m of what is seen and the sensor, without stray points: ends along x and y of the world."""
         pose = self.pose

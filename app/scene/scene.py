@@ -59,9 +59,10 @@ class Scene:
 
     def _draw_scan(self, frame: Frame) -> None:
         layers, scan = frame.settings.view.layers, frame.scan
-        self._canvas.points(
-            "points", layers.points, scan.xy[scan.valid], point_colours(frame, self._colour("points"))
+        colours = (
+            point_colours(frame, self._colour("points")) if frame.is_placed else self._colour("tentative")
         )
+        self._canvas.points("points", layers.points, scan.xy[scan.valid], colours)
 
     def _draw_gaps(self, frame: Frame) -> None:
         """The sectors whose data were lost on the way, as wedges."""
@@ -72,7 +73,9 @@ class Scene:
     def _draw_segments(self, frame: Frame) -> None:
         found = {name: features.segments for name, features in _main_on_top(frame)}
         strokes = np.concatenate([np.stack([s.start, s.end], 1) for s in found.values()])
-        if frame.settings.view.colour == "segment" and len(found) == 1:
+        if not frame.is_placed:
+            colours = self._colour("tentative")
+        elif frame.settings.view.colour == "segment" and len(found) == 1:
             colours = categorical(len(strokes))
         else:
             colours = self._method_colours({name: len(segments) for name, segments in found.items()})

@@ -1,12 +1,12 @@
-// Where the sensor is: the state of the filter, the pose with its uncertainty, what was matched, and the truth where
-// there is one.
+// Where the sensor is: the state of the filter, the pose with its uncertainty, and what was matched.
 
+import { comparison } from "./comparison.js";
 import { $, el, remake, setText } from "./dom.js";
 import { isStale } from "./live.js";
-import { errorOf, positionSigma } from "./pose.js";
+import { isSought } from "./pose.js";
 import { isPlaying } from "./actions.js";
 import { on } from "./store.js";
-import { degrees, fixed, metres, microseconds, millimetres, UNKNOWN, wholeNumber } from "./units.js";
+import { DEGREE, degrees, fixed, metres, microseconds, spread, UNKNOWN, wholeNumber } from "./units.js";
 
 const STATES = {
   starting: "Starting, too little seen so far",
@@ -24,26 +24,29 @@ const POSE = [
     key: "x",
     label: "x",
     value: ({ pose }) => `${metres(pose.x)}\u2009m`,
-    sigma: (now) => inMm(now.covariance[0][0]),
+    sigma: (now) => offBy(now.covariance[0][0]),
   },
   {
     key: "y",
     label: "y",
     value: ({ pose }) => `${metres(pose.y)}\u2009m`,
-    sigma: (now) => inMm(now.covariance[1][1]),
+    sigma: (now) => offBy(now.covariance[1][1]),
   },
   {
     key: "heading",
     label: "Heading",
     value: ({ pose }) => `${degrees(pose.heading)}°`,
-    sigma: ({ covariance }) => `±\u2009${fixed((180 / Math.PI) * Math.sqrt(covariance[2][2]), 2)}°`,
+    sigma: (now) => turnedBy(Math.sqrt(now.covariance[2][2])),
   },
 ];
 
 const NIS_ABOUT =
   "If NIS is mostly below its band, the ellipses are larger than necessary: lower the noise or Unevenness. If it is mostly above, they are too small.";
 
-const inMm = (variance) => `±\u2009${millimetres(Math.sqrt(variance))}\u2009mm`;
+const offBy = (variance) => `±\u2009${spread(Math.sqrt(variance))}`;
+
+/** A heading that may be any is not known. */
+const turnedBy = (sigma) => (sigma > Math.PI ? "unknown" : `±\u2009${fixed(sigma / DEGREE, 2)}°`);
 
 const COUNTS = [
   { key: "confirmed", label: "Confirmed", hint: "Landmarks of the map", read: ({ confirmed }) => confirmed },
@@ -153,8 +156,8 @@ function draw(frame, { navigation }, source, connection, { problem }) {
   $("pose-panel-message").hidden = !message;
   setText($("pose-panel-message"), message);
   for (const { key, value, sigma } of POSE) {
-    setText($(`pose-${key}`), isPlaced(now) ? value(now) : UNKNOWN);
-    setText($(`pose-sigma-${key}`), isPlaced(now) ? sigma(now) : "");
+    setText($(`pose-${key}`), hasPose(now) ? value(now) : UNKNOWN);
+    setText($(`pose-sigma-${key}`), hasPose(now) ? sigma(now) : "");
   }
   for (const { key, read, text = wholeNumber } of COUNTS)
     setText($(`count-${key}`), now ? text(read(now, timings, source)) : UNKNOWN);
@@ -165,55 +168,9 @@ function draw(frame, { navigation }, source, connection, { problem }) {
   );
 }
 
-/** A known map says nothing of the pose until something of it was recognised. */
-const isPlaced = (now) => now && !(now.mode === "localize" && now.state === "starting");
+const hasPose = (now) => now && !isSought(now);
 
 function stateText(now, problem) {
   if (!now) return problem ?? "Waiting for a scan";
-  return STATES[now.mode === "localize" && now.state === "starting" ? "searching" : now.state];
-}
-
-/** Lines of [label, text, hint] beside the estimate. */
-function comparison(now) {
-  const {
-    velocity,
-    sideways,
-    dead_reckoned: reckoned,
-    truth,
-    nis,
-    dof,
-    nis_band: [low, high],
-  } = now;
-  const error = errorOf(now);
-  return [
-    velocity && [
-      "Speed",
-      `${fixed(Math.hypot(velocity[0], sideways), 2)}\u2009m/s, ${degrees(velocity[1])}°/s`,
-      "Estimated, in whatever direction, with the turn rate",
-    ],
-    dof && [
-      "NIS",
-      `${fixed(nis, 1)} of ${dof}, 95 %: ${fixed(low, 0)} to ${fixed(high, 0)}`,
-      "Normalized innovation squared, and the interval that holds 95 % of its values if the filter is consistent",
-    ],
-    reckoned && [
-      "Odometry only",
-      poseText(reckoned),
-      "The pose from odometry alone",
-    ],
-    truth && ["True pose", poseText({ x: truth[0], y: truth[1], heading: truth[2] }), "From the simulator or a reference system"],
-    error && [
-      "Error",
-      errorText(error, now),
-      "Distance from the true pose, and the standard deviation along the longest axis",
-    ],
-  ].filter(Boolean);
-}
-
-const poseText = ({ x, y, heading }) =>
-  `${fixed(x, 3)}, ${fixed(y, 3)}\u2009m${heading === null ? "" : `, ${degrees(heading)}°`}`;
-
-function errorText({ distance, heading }, now) {
-  const turn = heading === null ? "" : `, ${fixed((180 / Math.PI) * heading, 2)}°`;
-  return `${millimetres(distance)}\u2009mm (1σ ${millimetres(positionSigma(now))})${turn}`;
+  return STATES[isSought(now) ? "searching" : now.state];
 }

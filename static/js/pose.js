@@ -20,5 +20,11 @@ export function errorOf({ pose, truth }) {
 export const isOfScans = ({ mode, method }, localization) =>
   mode === "slam" ? method === "scans" : mode === "localize" && localization.method === "scans";
 
+/** Whether a known map is still searched for the first time: the pose says nothing then. */
+export const isSought = ({ mode, state }) => mode === "localize" && state === "starting";
+
+/** Whether what is seen lies at the pose: in a known map it does not until it is found there, nor when lost. */
+export const isPlaced = ({ mode, state }) => mode === "slam" || !["starting", "lost"].includes(state);
+
 /** An angle in -π to π. */
 export const wrapped = (angle) => Math.atan2(Math.sin(angle), Math.cos(angle));

@@ -34,6 +34,12 @@ export const degrees = (value) => fixed(value / DEGREE, 1);
 export const fineDegrees = (value) => fixed(value / DEGREE, 3);
 export const squareMillimetres = (value) => fixed(value * 1e6, Math.abs(value) < 1e-5 ? 1 : 0);
 
+/** A standard deviation of a place: in millimetres, above a metre in metres with three digits. */
+export function spread(value) {
+  if (!(value >= 1)) return `${millimetres(value)}\u2009mm`;
+  return `${fixed(value, Math.max(0, 2 - Math.floor(Math.log10(value))))}\u2009m`;
+}
+
 /** A duration given in microseconds: three digits and a unit that fits. */
 export function microseconds(value) {
   if (!Number.isFinite(value)) return "\u2013";

@@ -8,7 +8,7 @@ import { parameterRow } from "./parameters.js";
 import { LANDMARK_SIGMAS } from "./overlay/marks.js";
 import { TOOLS } from "./overlay/tools.js";
 import { ownChoices } from "./own.js";
-import { isOfScans } from "./pose.js";
+import { isOfScans, isPlaced } from "./pose.js";
 import { get, on } from "./store.js";
 import { shape } from "./svg.js";
 import { fixed } from "./units.js";
@@ -84,7 +84,7 @@ const OF_SCAN = [
 
 /** Where the sensor is and was, as the scene may show it: layer -> sign, and whether it is known. */
 const PATHS = [
-  { layer: "pose", sign: "pose-sign", label: "Position, 95\u2009%", isKnown: () => true },
+  { layer: "pose", sign: "pose-sign", label: "Position, 95\u2009%", isKnown: isPlaced },
   { layer: "trail", sign: "trail", label: NAMES.trail, isKnown: () => true },
   {
     layer: "dead_reckoned",

@@ -14,7 +14,7 @@ const RING_PX = 12;
 const ARC_STEP = 0.05; // rad along the rim of a sector
 const WEDGE = 0.2; // of what fills it
 const THIN = 0.12; // of what fills an ellipse
-const FAINT = 0.4; // of the outline of one that does not fit into the view, and is not filled
+const FAINT = 0.4; // of the outline of one that does not fit into the view, and is not filled, and of walls not placed
 const FADED_S = 60; // after which a landmark that is not seen looks its palest
 const PALEST = 0.45;
 const FEW = 40; // landmarks that have room for their numbers
@@ -30,20 +30,22 @@ export function drawMarks(pen, look, world, { view, mask, selection, hovered, co
   const ellipses = (entries) => drawEllipses(pen, look, entries, sizes);
   if (layers.landmarks) drawLandmarks(pen, look, world, { ellipses, colours });
   if (layers.rejected) drawRejections(pen, look, world, colours);
-  if (layers.pose && world.frame.localization) drawPose(world, { ellipses, colours });
+  if (layers.pose && world.frame.localization && world.isPlaced) drawPose(world, { ellipses, colours });
   if (layers.sensor) for (const sector of mask) drawSector(pen, look, world.sensor, sector, colours);
   if (layers.sensor) drawSensor(pen, look, world.sensor, colours);
   for (const corner of world.corners) {
     if (layers.corners) drawCorner(pen, look, corner, colours);
     if (layers.ellipses) ellipses(ellipsesOf(corner, scale, colours));
   }
+  if (!world.isPlaced) label(pen, look, world.sensor.at, "Not placed in the map", colours);
   drawChosen(pen, look, world, { selection, hovered, colours });
   return sizes;
 }
 
 /** The walls of the main method, where no scene shows them. */
-export function drawWalls(pen, look, { frame, walls }, { methods }) {
-  for (const wall of walls) along(pen, look, wall, { stroke: methods[frame.methods[0]].colour, width: 2 });
+export function drawWalls(pen, look, { frame, walls, isPlaced }, { methods }) {
+  const opacity = isPlaced ? 1 : FAINT;
+  for (const wall of walls) along(pen, look, wall, { stroke: methods[frame.methods[0]].colour, width: 2, opacity });
 }
 
 /** The walls of the map, where no scene shows them. */

@@ -1,5 +1,6 @@
 // What a frame holds, where it is in the world: corners, walls, rejections and landmarks with their places in metres.
 
+import { isPlaced } from "../pose.js";
 import { turned } from "./ellipses.js";
 
 /** Takes [x, y] in the sensor frame to the world, by T_world_sensor. */
@@ -17,6 +18,7 @@ export function worldOf(frame, landmarks, mapped = NONE) {
   const heading = pose?.heading ?? 0;
   return {
     frame,
+    isPlaced: !frame.localization || isPlaced(frame.localization),
     sensor: { at: place([0, 0]), heading },
     corners: frame.corners.map((corner) => cornerOf(corner, place, heading)),
     walls: (frame.segments[frame.methods[0]] ?? []).map((wall) => wallOf(wall, place)),
