@@ -35,8 +35,8 @@ class CurrentPoseJson(TypedDict):
     """T_world_sensor at `stamp` with its covariance (m², m rad, rad²), and what the filter thinks of itself.
 
     While a map is localized in and the state is `starting`, nothing is known of the pose yet: its numbers count from
-    zero, and its covariance is that of a pose that may be anywhere. In the state `lost` they go on from where the sensor
-    was last found, and are not to be trusted.
+    zero, and its covariance is that of a pose that may be anywhere. In the state `lost` they go on from where the
+    sensor was last found, and are not to be trusted.
     """
 
     stamp: float
