@@ -1,7 +1,7 @@
 """Where the sensor is, from scan to scan: the navigator of the current run, what feeds it and what it leaves behind."""
 
 import threading
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import Literal, Protocol
 
@@ -93,6 +93,8 @@ class Navigation:
         self.odometry = OdometryFeed()
         self.problem: str | None = None
         self.runs = 0  # that have begun
+        # Told of other walls of a map that is made, from a thread of its own.
+        self.map_listeners: list[Callable[[], None]] = []
         self._store = store
         self._map: int | None = None
         self._run: Run | None = None
@@ -221,9 +223,7 @@ class Navigation:
         self.problem = None
         replay = (timed.name, wanted) if timed.position.kind == "recording" else None
         if wanted.mode == "slam" and wanted.method == "scans":
-            navigator = WholeScans(
-                settings.extraction, lambda: self._store.begin_walls(timed.name, replay=replay).put
-            )
+            navigator = WholeScans(settings.extraction, lambda: self._begin_walls(timed.name, replay))
             self._run = Run(timed.source, wanted, navigator, None, None, Trails(own_frame=True))
             self._placed = None
         elif wanted.mode == "slam":
@@ -238,6 +238,17 @@ class Navigation:
             self._run.navigator.place(*self._placed)
             self._placed = None
         return self._run
+
+    def _begin_walls(self, source: str, replay: Hashable) -> Callable[[OccupancyGrid, WallTable], None]:
+        """Where grid and walls go whenever they are other ones."""
+        run = self._store.begin_walls(source, replay=replay)
+
+        def keep(grid: OccupancyGrid, walls: WallTable) -> None:
+            run.put(grid, walls)
+            for listener in self.map_listeners:
+                listener()
+
+        return keep
 
     def _localizing(self, timed: TimedScan, settings: Settings) -> Run | None:
         self._store.settle()

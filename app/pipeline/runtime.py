@@ -60,6 +60,7 @@ class Runtime:
         self._draw = draw
         self._newest = NewestScan()
         self.player = Player(source, self._newest.put, lambda: self._newest.idle, self.announce)
+        navigation.map_listeners.append(self._show_map)
         self._tracker, self._source = Tracker(dormant=DORMANT), 0
         self._times: deque[float] = deque(maxlen=20)
         self._sequence = 0
@@ -149,6 +150,11 @@ class Runtime:
         self.player.refresh()
         self.announce()
         return self.settings
+
+    def _show_map(self) -> None:
+        """The map is behind the scans: what it makes of the last ones is shown, too, if no next scan will show it."""
+        if self.player.status().state != "playing":
+            self.player.refresh()
 
     def announce(self) -> None:
         """Tell the listeners that something besides the frame has changed."""

@@ -1,6 +1,7 @@
 """SLAM from whole scans on a real server that plays a simulated robot: pose, grid and walls over REST."""
 
 import io
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -14,6 +15,8 @@ from PIL import Image
 from serving import Server, assert_problem, wait_until
 
 from lidarcore.mapping.grid import read_ros_map, shades_of
+from lidarcore.simulation.robot import SimulatedRobot
+from lidarcore.simulation.settings import SimulationSettings
 
 WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
 LANDMARKS = {"navigation": {"mode": "slam", "method": "landmarks"}}
@@ -135,3 +138,27 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
     wait_until(lambda: first_pose(driving)["stamp"] > first["stamp"], "a reset begins a new map")
     first = first_pose(driving)
     assert (first["x"], first["y"], first["heading"]) == pytest.approx((0, 0, 0), abs=1e-9)
+
+
+def test_what_the_map_makes_of_the_last_scans_is_shown_when_no_further_one_comes(server: Server) -> None:
+    """Walls are sought behind the scans: where a recording has ended, a page has those that REST tells."""
+    scans = list(islice(SimulatedRobot(SimulationSettings(world="furnished room", seed=3)), 150))
+    np.savez(
+        server.folder / "drive.npz",
+        ranges=np.array([scan.ranges for scan in scans]),
+        bearings=scans[0].bearings,
+        stamps=np.array([scan.stamp for scan in scans]),
+    )
+
+    def last_seen() -> float:
+        answer = server.http.get("/walls")
+        walls = answer.json()["walls"] if answer.is_success else []
+        return max((wall["last_seen"] for wall in walls), default=0.0)
+
+    server.change("PATCH", "/settings", WHOLE_SCANS)
+    server.change("PATCH", "/source", {"speed": 0, "loop": False})
+    with server.stream() as stream:
+        server.change("PUT", "/source", {"kind": "recording", "name": "drive.npz"})
+        wait_until(lambda: last_seen() > scans[-1].stamp - 1, "the walls know the last scans")
+        stream.until("walls", lambda told: told["walls"] == server.get("/walls")["walls"])
+    assert server.get("/source")["state"] == "ended"
