@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from backports import zstd
 from mcap.writer import CompressionType
-from ros_writers import drive, write_mcap
+from ros_writers import drive, laser, write_bag1, write_mcap
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
@@ -39,7 +39,9 @@ def test_scans_are_those_that_rosbags_reads(data, name):
             laser_.header.stamp.sec + laser_.header.stamp.nanosec / 1e9, abs=1e-6
         )
         np.testing.assert_array_equal(scan.quality, laser_.intensities)
-        np.testing.assert_allclose(np.diff(scan.beam_times), laser_.time_increment, atol=1e-9)
+        # Of both RPLIDARs the beams were taken the other way round.
+        np.testing.assert_allclose(np.diff(scan.beam_times), -laser_.time_increment, atol=1e-9)
+        assert scan.beam_times[-1] == 0
 
 
 @pytest.mark.parametrize(
@@ -76,6 +78,35 @@ def test_the_bag_with_the_broken_index_is_read_to_its_end(data):
     ranges = np.concatenate([scan.ranges for scan in scans[:278]])
     assert np.mean(np.isfinite(ranges)) == pytest.approx(0.94, abs=0.005)
     assert np.nanpercentile(ranges, [1, 50, 99]) == pytest.approx([0.78, 1.73, 3.83], abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("of", "turn", "ends", "beams", "takes", "backwards"),
+    [
+        ("RPLIDAR", 359, 180, 720, 0.1345, True),
+        ("RPLIDAR, newer node", 360, 180, 1440, 0.1, True),
+        ("another that counts as many intervals as beams", 360, 180, 720, 0.1 * 719 / 720, False),
+        ("another that begins elsewhere", 359, 179, 360, 0.1, False),
+        ("another that sees three quarters", 270, 135, 1080, 0.1, False),
+    ],
+)
+def test_which_scans_are_listed_from_their_last_beam(tmp_path, of, turn, ends, beams, takes, backwards):
+    first, last = math.radians(ends - turn), math.radians(ends)
+    fields = {
+        "angle_min": first,
+        "angle_max": last,
+        "angle_increment": (last - first) / (beams - 1),
+        "time_increment": takes / (beams - 1),
+        "scan_time": takes if backwards or turn != 360 else 0.1,
+    }
+    message = laser(100.0, np.full(beams, 2.0), **fields)
+    write_bag1(tmp_path / "a.bag", [("/scan", "sensor_msgs/LaserScan", message, 100.0)])
+    recording = open_recording(tmp_path / "a.bag")
+    (scan,) = recording
+    right, left = (int(np.argmin(np.abs(scan.bearings - at))) for at in (-1.0, 1.0))
+    ahead = (scan.beam_times[left] - scan.beam_times[right]) / (scan.bearings[left] - scan.bearings[right])
+    assert ahead == pytest.approx((-1 if backwards else 1) * takes / math.radians(turn), rel=1e-4)
+    assert any("beam times turned" in note for note in recording.notes) == backwards
 
 
 def test_ranges_beyond_range_max_are_missing(data):

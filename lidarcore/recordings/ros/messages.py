@@ -1,5 +1,6 @@
 """ROS messages, ROS 1 or ROS 2, decoded by rosbags; LaserScan to Scan."""
 
+import math
 from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
@@ -99,6 +100,11 @@ def scan_of(
         count("scans that ran clockwise, turned", int(increment < 0))
         bearings = laser.angle_min + laser.angle_increment * np.arange(len(ranges))
         times = laser.time_increment * np.arange(len(ranges)) if 0 < laser.time_increment < np.inf else None
+        if times is not None and _is_listed_backwards(laser):
+            count(
+                "scans listed from the last beam to the first, as ROS does of RPLIDARs; beam times turned", 1
+            )
+            times = times[::-1]
         gaps, kept = np.empty((0, 2)), np.arange(len(ranges))
     else:
         bearings, gaps = beams.bearings, beams.gaps.reshape(-1, 2)
@@ -115,6 +121,22 @@ def scan_of(
         times if times is None else times[order],
         odometry,
         gaps,
+    )
+
+
+def _is_listed_backwards(laser: Any) -> bool:
+    """Whether a scan is one of ROS's RPLIDAR node, or of those made after it for other sensors that turn clockwise.
+
+    It lists beams counter-clockwise, as it should, though they were taken clockwise, and gives them times as if they
+    had been taken as they are listed (github.com/Slamtec/rplidar_ros, issue 55). What the sensor calls 0 it calls pi,
+    where the last beam is; the first lies 359 or 360 degrees before, and its scans take as long as all intervals.
+    """
+    steps = len(laser.ranges) - 1
+    span = steps * laser.angle_increment
+    is_turn = any(math.isclose(span, math.radians(turn), abs_tol=1e-4) for turn in (359, 360))
+    begins_at_pi = math.isclose(laser.angle_min + span, math.pi, abs_tol=1e-4)
+    return (
+        is_turn and begins_at_pi and math.isclose(steps * laser.time_increment, laser.scan_time, rel_tol=1e-5)
     )
 
 
