@@ -1,6 +1,7 @@
 """Where keyframes lie in a known map, in a thread of its own: a scan never waits for a search."""
 
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from lidarcore.geometry import UncertainPose, compose, largest_variance
 from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.live.background import Background, Corrected, MapPicture
 from lidarcore.mapping.live.worker import Worker
-from lidarcore.mapping.relocation import Relocation, Relocator, Verdict, query_of
+from lidarcore.mapping.relocation import Query, Relocation, Relocator, Verdict, query_of
 from lidarcore.mapping.settings import VAGUE
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
@@ -109,18 +110,28 @@ class LocateWorker(Background):
         """Compare the last keyframes with the map: near the pose if there is one, else everywhere."""
         if self._relocator is None:
             self._relocator = Relocator(self._grid)
-        scans, poses = zip(*self._recent, strict=True)
-        query = query_of(scans, np.array(poses))
-        state = self._verdict[0]
+        relocator, here, state = self._relocator, self._here, self._verdict[0]
         if state in ("tracking", "coasting"):
-            self._follow(self._relocator.find_near(query, self._here), self._relocator)
+            self._follow(self._found(lambda query: relocator.find_near(query, here)), relocator)
         elif not waiting:
-            found = self._relocator.find(query)
+            found = self._found(relocator.find)
             if found.found:
                 self._here, self._begin = UncertainPose(found.pose, found.covariance), self._local
                 self._verdict, self._misses = ("coasting", _ONCE), 0
             else:
                 self._verdict = state, _WHY_NOT[found.verdict]
+
+    def _found(self, find: Callable[[Query], Relocation]) -> Relocation:
+        """What a search finds by the last keyframes together, or by the last one alone where those fit nowhere.
+
+        Together they see more walls, but also whoever walks about in as many places as there are keyframes.
+        """
+        scans, poses = zip(*self._recent, strict=True)
+        together = find(query_of(scans, np.array(poses)))
+        if together.verdict != "no fit" or len(scans) == 1:
+            return together
+        alone = find(query_of(scans[-1:]))
+        return alone if alone.found else together
 
     def _follow(self, near: Relocation, relocator: Relocator) -> None:
         if near.found:

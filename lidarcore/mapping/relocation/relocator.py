@@ -12,7 +12,7 @@ from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field, searchable
 from lidarcore.mapping.relocation.query import Query
 from lidarcore.mapping.relocation.refine import refined
-from lidarcore.mapping.relocation.search import Turned, best_pose, contradicted, fit_at, squares
+from lidarcore.mapping.relocation.search import Turned, best_pose, borne_out, contradicted, fit_at, squares
 from lidarcore.mapping.relocation.settings import RelocationSettings
 
 Verdict = Literal["found", "too few points", "no fit", "several places"]
@@ -51,19 +51,24 @@ class Relocation:
 
 
 class _Place(NamedTuple):
-    """How well the points fit at a pose (3,) in cells of the field, and the share of rays that the map contradicts."""
+    """A pose (3,) in cells of the field at which the points fit.
+
+    fit      how well they do
+    worth    how well those do whose rays the map does not contradict
+    against  share of the rays that it contradicts
+    """
 
     fit: float
+    worth: float
     against: float
     pose: Array
 
 
-def _worth(place: _Place) -> float:
-    return place.fit - place.against
-
-
 class Relocator:
     """Finds poses in one map. Making it takes a moment; it may be asked from several threads.
+
+    Things may have been moved since the map was made: where it contradicts a ray, the point does not fit, and nothing
+    more is held against the place.
 
     A map of more than some 200 m by 200 m in cells of 5 cm is searched in larger ones, and poses are known less well.
 
@@ -81,9 +86,7 @@ class Relocator:
             return _nowhere("too few points")
         height, width = self._field.room.shape[1:]
         angles = self._angles(query)
-        found = self._best(
-            query, angles, np.arange(len(angles)), LEVELS - 1, (0, 0, width, height), self.settings.against
-        )
+        found = self._best(query, angles, np.arange(len(angles)), LEVELS - 1, (0, 0, width, height))
         if found is not None and found.found and _evidence(found.fit, len(query.points)) < _SURE:
             return replace(found, verdict="too few points")
         return found or _nowhere("no fit")
@@ -92,8 +95,7 @@ class Relocator:
         """Where the last scan of a query was taken, within three standard deviations of a guess T_world_sensor.
 
         If it is not found there, the answer says how well the guess itself fits. Only places near the guess are
-        rivals. Rays that the map contradicts weigh against a place, but forbid none: something may have changed since
-        the map was made.
+        rivals.
         """
         angles, at = self._angles(query), self._in_field(guess.pose)
         if len(query.points) < self.settings.least_points:
@@ -106,16 +108,10 @@ class Relocator:
         left, low, right, high = ends.astype(int).ravel().tolist()
         level = int(np.clip(np.log2(away) - 1, _NEAR_LEVEL, LEVELS - 1))
         box = left, low, right, high
-        return self._best(query, angles, near, level, box, against=1.0) or self._as_guessed(query, at)
+        return self._best(query, angles, near, level, box) or self._as_guessed(query, at)
 
     def _best(
-        self,
-        query: Query,
-        angles: Array,
-        tried: Ints,
-        level: int,
-        box: tuple[int, int, int, int],
-        against: float,
+        self, query: Query, angles: Array, tried: Ints, level: int, box: tuple[int, int, int, int]
     ) -> Relocation | None:
         """The best pose at some of the angles in a box of cells, if the points fit at one."""
         s, field = self.settings, self._field
@@ -132,14 +128,14 @@ class Relocator:
                 break
             pose = self._pose(angles, place)
             taken = np.vstack([taken, np.array([place], np.int32)])
-            places.append(_Place(fit / full, self._against(query, pose), pose))
-            threshold = int(full * max(s.rival * max(places, key=_worth).fit, s.fit))
-        return self._judged(query, places, against) if places else None
+            places.append(self._place(query, fit / full, pose))
+            threshold = int(full * max(s.rival * _best_of(places).fit, s.fit))
+        return self._judged(query, places) if places else None
 
-    def _judged(self, query: Query, places: list[_Place], against: float) -> Relocation:
+    def _judged(self, query: Query, places: list[_Place]) -> Relocation:
         """The best of the places at which the points fit, and whether it stands alone."""
         s = self.settings
-        best = max(places, key=_worth)
+        best = _best_of(places)
         rivals = [
             other.fit
             for other in places
@@ -148,7 +144,7 @@ class Relocator:
             and other.against <= best.against + s.against
         ]
         verdict: Verdict = "found"
-        if _worth(best) < s.fit or best.against > against:
+        if best.worth < s.fit:
             verdict = "no fit"
         elif rivals or len(places) == _MOST_PLACES:
             verdict = "several places"
@@ -162,8 +158,7 @@ class Relocator:
         columns, rows = _turned(query.points / self._grid.resolution, at[2:])
         column, row = np.floor(at[:2]).astype(int).tolist()
         fit = fit_at(self._field.levels[0], columns[0], rows[0], column, row, 0) / FULL / len(query.points)
-        nowhere = _nowhere("no fit")
-        return replace(nowhere, fit=fit, against=self._against(query, at))
+        return replace(_nowhere("no fit"), fit=fit, against=self._place(query, fit, at).against)
 
     def _angles(self, query: Query) -> Array:
         """Headings at steps by which the farther points move about as far as they may lie beside the map."""
@@ -176,9 +171,11 @@ class Relocator:
         """(3,) in cells of the field: the middle of the cell."""
         return np.array([place[1] + 0.5, place[2] + 0.5, angles[place[0]]])
 
-    def _against(self, query: Query, pose: Array) -> float:
+    def _place(self, query: Query, fit: float, pose: Array) -> _Place:
+        """A pose in cells of the field, and what speaks for and against it."""
         points, origins = (act(pose, xy / self._grid.resolution) for xy in (query.points, query.origins))
-        return float(contradicted(self._field.states, points, origins))
+        worth = borne_out(self._field, points, origins)
+        return _Place(fit, float(worth), float(contradicted(self._field.states, points, origins)), pose)
 
     def _in_field(self, pose: Array) -> Array:
         """A pose (3,) in the world in cells of the field."""
@@ -192,6 +189,10 @@ class Relocator:
         J = np.eye(3)
         J[:2, :2] = cell * rotation(self._grid.origin[2])
         return compose(self._grid.origin, in_grid), J @ covariance @ J.T
+
+
+def _best_of(places: list[_Place]) -> _Place:
+    return max(places, key=lambda place: place.worth)
 
 
 def _turned(points: Array, angles: Array) -> Turned:

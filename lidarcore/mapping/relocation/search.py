@@ -136,26 +136,42 @@ def _is_taken(taken: Shorts, a: int, column: int, row: int, angles: int, apart: 
 
 
 @kernel
-def contradicted(states: Bytes, points: Array, origins: Array) -> float:
-    """Share of rays, from origins to points (N, 2) in cells, that the map contradicts.
+def borne_out(field: Field, points: Array, origins: Array) -> float:
+    """How well the points (N, 2) fit, in cells: 0 to 1. One whose ray the map contradicts does not."""
+    total = 0
+    for k in range(len(points)):
+        column, row = int(np.floor(points[k, 0])), int(np.floor(points[k, 1]))
+        is_inside = 0 <= row < field.states.shape[0] and 0 <= column < field.states.shape[1]
+        if is_inside and not _is_contradicted(field.states, points[k], origins[k]):
+            total += field.levels[0, row, column]
+    return total / FULL / max(len(points), 1)
 
-    A ray is contradicted if it goes through something occupied and on into the open, or ends in the open. One that only
-    grazes the wall on which it ends is not.
-    """
+
+@kernel
+def contradicted(states: Bytes, points: Array, origins: Array) -> float:
+    """Share of rays, from origins to points (N, 2) in cells, that the map contradicts."""
     wrong = 0
     for k in range(len(points)):
-        dx, dy = points[k, 0] - origins[k, 0], points[k, 1] - origins[k, 1]
-        steps = int(np.hypot(dx, dy)) + 1
-        bad = _state(states, points[k, 0], points[k, 1]) == OPEN
-        is_through = False
-        for step in range(steps):
-            state = _state(states, origins[k, 0] + dx * step / steps, origins[k, 1] + dy * step / steps)
-            is_through |= state == OCCUPIED
-            if is_through and state == OPEN:
-                bad = True
-                break
-        wrong += bad
+        wrong += _is_contradicted(states, points[k], origins[k])
     return wrong / max(len(points), 1)
+
+
+@kernel
+def _is_contradicted(states: Bytes, point: Array, origin: Array) -> bool:
+    """Whether a ray goes through something occupied and on into the open, or ends in the open.
+
+    One that only grazes the wall on which it ends is not contradicted.
+    """
+    if _state(states, point[0], point[1]) == OPEN:
+        return True
+    dx, dy = point[0] - origin[0], point[1] - origin[1]
+    steps, is_through = int(np.hypot(dx, dy)) + 1, False
+    for step in range(steps):
+        state = _state(states, origin[0] + dx * step / steps, origin[1] + dy * step / steps)
+        is_through |= state == OCCUPIED
+        if is_through and state == OPEN:
+            return True
+    return False
 
 
 @kernel

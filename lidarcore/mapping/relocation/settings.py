@@ -27,10 +27,16 @@ class RelocationSettings:
         0.1,
         1.0,
         "",
-        "least share of the points that fit the map, less the share of contradicted rays",
+        "least share of the points that fit the map, by rays that it does not contradict",
         default=0.65,
     )
-    against: float = number(0.0, 1.0, "", "largest share of the rays that the map contradicts", default=0.15)
+    against: float = number(
+        0.0,
+        1.0,
+        "",
+        "a rival is a place where the map contradicts this share of the rays more, at most",
+        default=0.15,
+    )
     rival: float = number(
         0.1, 1.0, "", "share of the best fit from which another place is a rival", default=0.85
     )
