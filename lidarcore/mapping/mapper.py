@@ -74,9 +74,10 @@ class Mapper:
             self._numbers.append(len(self._ties))
             self._locals.append(local)
             self._refined = None
-            self._back.add(tracked)
         if tracked.first is not None:
             self._motions[0] = _motion_of(tracked.first)
+        if tracked.is_news:
+            self._back.add(tracked)
         self._motions.append(_motion_of(tracked))
         self._stamps.append(tracked.stamp)
         self._ties.append(tie)

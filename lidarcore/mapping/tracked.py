@@ -25,7 +25,7 @@ class Tracked:
     keyframe  whether the scan is one
     island    True if it lies on nothing known, or fits in several places, and its heading is vague: how it, and what
               follows, lies to what was before is open
-    first     the first keyframe anew, now that the motion in it is known; told once, with the second one
+    first     the first keyframe anew, now that the motion in it is known; told once, with the second scan
     """
 
     stamp: float
@@ -41,3 +41,8 @@ class Tracked:
     keyframe: bool
     island: bool
     first: "Tracked | None" = None
+
+    @property
+    def is_news(self) -> bool:
+        """Whether it says something of the keyframes."""
+        return self.keyframe or self.first is not None

@@ -149,6 +149,16 @@ def test_a_map_that_begins_while_the_robot_drives_does_not_hang_on_a_bent_scan(o
     assert np.hypot(*off[:, :2].T).max() < 0.01
 
 
+def test_a_map_of_one_keyframe_does_not_hang_on_a_bent_scan_either():
+    """Of four scans on the same way only the first is a keyframe: with its motion still in it they lay 9 cm away."""
+    scans = honesty.drive("two rooms", 1.2, seed=2)[:4]
+    mapper = Mapper(MapperSettings().with_noise(SensorNoise(0.01, 0.001)))
+    assert {mapper.step(scan).keyframe for scan in scans} == {0}
+    mapper.finish()
+    true = relative(scans[0].truth, np.array([scan.truth for scan in scans]))
+    assert np.hypot(*pose_difference(mapper.trajectory()[1], true)[:, :2].T).max() < 0.015
+
+
 @pytest.mark.parametrize("odometry", [True, False])
 def test_what_moves_while_a_scan_is_taken_is_as_far_off_as_it_says(odometry):
     """Ten scans a second of a robot that turns: by its wheels alone headings were off by 8 mrad, and 15 sigma.

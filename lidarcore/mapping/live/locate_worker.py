@@ -94,9 +94,11 @@ class LocateWorker(Background):
             self.corrected = Corrected(self._keyframes, np.array(self._poses), self._here.covariance)
 
     def _go_on(self, tracked: Tracked) -> None:
-        """Go on to the next keyframe, by the front end alone."""
+        """Go on to the next keyframe, by the front end alone, or take the first one anew."""
         if tracked.first is not None:
             self._recent[-1] = tracked.first.scan, self._local
+        if not tracked.keyframe:
+            return
         if self._poses:
             way = UncertainPose(tracked.tie.pose, tracked.tie.covariance + self._drift)
             self._here, self._local = self._here.compose(way), compose(self._local, way.pose)

@@ -95,6 +95,7 @@ class MapWorker(Background):
             self._back.thin()
         if tracked.first is not None:
             self._begin_grid(self._builder.settings)
+            self._walled = 0
 
     def _draw(self) -> None:
         self._next_picture = time.monotonic() + _EVERY

@@ -156,8 +156,9 @@ class WholeScans:
         tie = tracked.tie
         if tracked.keyframe:
             self._ways.append(UncertainPose(tie.pose, tie.covariance + self._settings.drift_covariance))
-            self._background.put(tracked)
             tie = _HERE
+        if tracked.is_news:
+            self._background.put(tracked)
         self._tie = tie
         known = self._background.corrected
         while self._ways and self._joined < known.keyframes:

@@ -61,9 +61,11 @@ class BackEnd:
         self._islands = Islands(self.graph, self.keyframes)
 
     def add(self, tracked: Tracked) -> None:
-        """Append a keyframe, and bend the map if it closes loops."""
+        """Append a keyframe, and bend the map if it closes loops; or take the first one anew, if it is told of."""
         if tracked.first is not None:
             self.keyframes[0] = _keyframe(tracked.first)
+        if not tracked.keyframe:
+            return
         if not self.keyframes:
             self.keyframes[0] = _keyframe(tracked)
             return

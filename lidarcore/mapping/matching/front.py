@@ -36,7 +36,7 @@ class FrontEnd:
         self._map = LocalMap(settings)
         self._known = self._moved = _HERE  # T_keyframe_scan, and by motion alone
         self._before: tuple[float, Array | None] | None = None  # stamp and odometry
-        self._first: Tracked | None = None  # until the second keyframe
+        self._first: Tracked | None = None  # until the second scan
         self._refused = 0  # scans in a row
         self.bridged: MotionError | None = None  # the break before the last scan, over which the map goes on
         self._sweep = Sweep()
@@ -59,8 +59,9 @@ class FrontEnd:
             )
             return self._first
         dt, driven = self._across(scan)
-        if self._first is not None and self._before[0] == self._first.stamp:
-            self._first = self._straightened(self._first, scan, removed, driven, dt)
+        first, self._first = self._first, None
+        if first is not None:
+            first = self._straightened(first, scan, removed, driven, dt)
             dt, driven = self._since(scan)
         guess, moved = self._known.compose(driven), self._moved.compose(driven)
         wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
@@ -88,12 +89,11 @@ class FrontEnd:
         taken = None if wheels is None else self.wheels
         tracked = Tracked(
             scan.stamp, self._number - 1, tie, moved, taken, on, scan, seen, self._sweep.covariance,
-            self._sweep.removed, leaves, island, self._first if leaves else None,
+            self._sweep.removed, leaves, island, first,
         )  # fmt: skip
         if leaves:
             if on and wheels is not None:
                 self._wheels.learn(moved, matched)
-            self._first = None
             if island:
                 self._map.clear()
             self._begin(seen, tie.pose)
