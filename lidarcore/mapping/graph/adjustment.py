@@ -17,6 +17,8 @@ from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
 from lidarcore.mapping.graph.known import Known, parted
 
 _GAP = 0.15  # m between two surfaces side by side
+_WITHIN = 0.03  # m by which the returns of a patch scatter along it
+_STRETCH = 4  # cells, of which a line tells the direction of the surface better than each of them
 _BEYOND = 1e6  # m between two islands
 
 
@@ -49,6 +51,7 @@ def normal_equations(
     arms, normals = (rotate(poses[seen.keyframes, 2], v) for v in (seen.means, seen.normals))
     places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
     order, starts = _ordered(places, normals, size, seen.keyframes, known)
+    normals = _straight(places, normals, seen.variances, size)
     turned = Observations(
         seen.keyframes[order], arms[order], normals[order], seen.variances[order], seen.near[order]
     )
@@ -58,6 +61,28 @@ def normal_equations(
     number, shared = sum_cells(turned, starts, poses, Noise(scale, unevenness**2), sums, groups)
     information = _sparse(sums.D, sums.U[:number], sums.at[:number], shared)
     return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups))), shared
+
+
+def _straight(places: Array, normals: Array, variances: Array, size: float) -> Array:
+    """Normals (M, 2) of the lines through the stretches of surface, some cells long, that patches are of.
+
+    Each cell has a direction of its own only if it says so: errors of many short ones, which point ahead in a bare
+    corridor now and behind then, would pass for knowledge of how far one went.
+    """
+    number = cells(places, normals, _STRETCH * size, _GAP)
+    weights = 1 / variances
+
+    def mean(values: Array) -> Array:
+        return np.bincount(number, weights * values) / total
+
+    total = np.bincount(number, weights)
+    n = np.stack([mean(normals[:, 0]), mean(normals[:, 1])], -1)
+    n = (n / np.hypot(n[:, 0], n[:, 1])[:, None])[number]
+    across, along = (n * places).sum(-1), n[:, 0] * places[:, 1] - n[:, 1] * places[:, 0]
+    r, t = across - mean(across)[number], along - mean(along)[number]
+    slope = (mean(r * t) / (mean(t * t) + _WITHIN**2))[number]
+    straight: Array = rotate(-np.arctan(slope), n)
+    return straight
 
 
 def _ordered(

@@ -9,6 +9,7 @@ from lidarcore.compiled import kernel
 
 _TILT = 1.0  # rad of a cell's line from the mean of its normals: held to 0.1, maps of long corridors bent
 _OUTLIER = 9.0  # squared standard deviations from which on a patch counts less
+_BENT = 9.0  # squared standard deviations by which a cell's line has to differ to have a direction of its own
 _PASSES = 4  # over a cell, until outliers no longer move its line
 
 
@@ -86,9 +87,15 @@ def sum_cells(
         low, high = starts[cell], starts[cell + 1]
         if keyframes[low] == keyframes[high - 1]:
             continue
-        nx, ny = _line(turned, poses, low, high, scratch)
+        nx, ny = _normal(turned, low, high)
+        _lie(turned, poses, nx, ny, low, high, scratch)
         _weigh(turned, noise, low, high, weights)
         a, b = _fit(turned, noise, low, high, scratch, N, m)
+        if b * b * (N[0, 0] * N[1, 1] - N[0, 1] * N[0, 1]) > _BENT * N[0, 0]:
+            nx, ny = (nx + b * ny) / np.hypot(1.0, b), (ny - b * nx) / np.hypot(1.0, b)
+            _lie(turned, poses, nx, ny, low, high, scratch)
+            _weigh(turned, noise, low, high, weights)
+            a, b = _fit(turned, noise, low, high, scratch, N, m)
         det, l00, l10, l11 = _inverse_root(N)
         i = low
         while i < high:
@@ -133,21 +140,30 @@ def _inverse_root(N: Array) -> tuple[float, float, float, float]:
 
 
 @kernel
-def _line(turned: Observations, poses: Array, low: int, high: int, scratch: _Scratch) -> tuple[float, float]:
-    """Mean normal of a cell, and how far its patches lie across and along, from their middle."""
-    keyframes, arms, normals = turned.keyframes, turned.means, turned.normals
-    nx = ny = x = y = 0.0
+def _normal(turned: Observations, low: int, high: int) -> tuple[float, float]:
+    """Mean of the normals in a cell."""
+    nx = ny = 0.0
     for i in range(low, high):
-        nx += normals[i, 0]
-        ny += normals[i, 1]
+        nx += turned.normals[i, 0]
+        ny += turned.normals[i, 1]
+    norm = np.hypot(nx, ny)
+    return nx / norm, ny / norm
+
+
+@kernel
+def _lie(
+    turned: Observations, poses: Array, nx: float, ny: float, low: int, high: int, scratch: _Scratch
+) -> None:
+    """How far the patches of a cell lie across and along, from their middle."""
+    keyframes, arms = turned.keyframes, turned.means
+    x = y = 0.0
+    for i in range(low, high):
         x += poses[keyframes[i], 0] + arms[i, 0]
         y += poses[keyframes[i], 1] + arms[i, 1]
-    x, y, norm = x / (high - low), y / (high - low), np.hypot(nx, ny)
-    nx, ny = nx / norm, ny / norm
+    x, y = x / (high - low), y / (high - low)
     for i in range(low, high):
         u, v = poses[keyframes[i], 0] + arms[i, 0] - x, poses[keyframes[i], 1] + arms[i, 1] - y
         scratch.r[i], scratch.t[i] = nx * u + ny * v, nx * v - ny * u
-    return nx, ny
 
 
 @kernel
