@@ -10,6 +10,7 @@ from lidarcore.geometry import UncertainPose, relative
 from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
 from lidarcore.mapping.matching.odometry_calibration import OdometryCalibration
 from lidarcore.mapping.matching.patches import Patches, patches
+from lidarcore.mapping.matching.persistence import Persistence
 from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, elapsed, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.tracked import Tracked
@@ -41,7 +42,7 @@ class FrontEnd:
         self.bridged: MotionError | None = None  # the break before the last scan, over which the map goes on
         self._sweep = Sweep()
         self._wheels = OdometryCalibration()
-        self._motion, self._period = np.zeros(3), 0.0  # s between scans, as stamps of single scans jitter
+        self._motion, self._period = Persistence(), 0.0  # s between scans, as stamps of single scans jitter
 
     def step(self, scan: Scan, removed: Array | None = None) -> Tracked:
         """Place a scan; removed (3,) m/s, m/s, rad/s is the motion that was taken out of it already.
@@ -61,9 +62,10 @@ class FrontEnd:
         dt, driven = self._across(scan)
         first, self._first = self._first, None
         if first is not None:
+            self._motion.begin(np.zeros(3), self._change(dt))  # it may have come at any speed
             first = self._straightened(first, scan, removed, driven, dt)
             dt, driven = self._since(scan)
-        guess, moved = self._known.compose(driven), self._moved.compose(driven)
+        guess, moved = self._known.compose(driven), self._moved.compose(self._farther(driven, scan))
         wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
         scan = self._sweep.remove(scan, wheels, removed)
         seen = patches(scan, self._settings.match)
@@ -82,9 +84,10 @@ class FrontEnd:
             tie = self._map.either(registered, rival)
         is_blind = len(seen.near.means) < BLIND
         island = not is_blind and not on and bool(tie.covariance[2, 2] > VAGUE**2)
-        self._motion = relative(self._known.pose, tie.pose) if on else np.zeros(3)
+        self._go_on(scan, guess, matched, dt, on)
         self._period += _SLOW * (dt - self._period)
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
+        tie = UncertainPose(tie.pose, tie.covariance + self._motion.astray)
         leaves = island or (not is_blind and self._leaves(tie[0], registered.inliers))
         taken = None if wheels is None else self.wheels
         tracked = Tracked(
@@ -130,7 +133,7 @@ class FrontEnd:
             self._begin_anew(straight.patches)
         self._begin_anew(straight.patches)
         if straight is not first:
-            self._motion = dt * straight.velocity
+            self._motion.begin(dt * straight.velocity)
             self._sweep.begin(straight.velocity)
         return straight
 
@@ -144,6 +147,7 @@ class FrontEnd:
         """The scan is a keyframe, at a pose (3,) from the one before it."""
         self._map.add(seen, tie)
         self._known = self._moved = _HERE
+        self._motion.leave()
         self._number += 1
 
     def _across(self, scan: Scan) -> tuple[float, UncertainPose]:
@@ -170,8 +174,7 @@ class FrontEnd:
             raise MotionError(f"The clock went back by {back:g} s: leave the scan out, or begin a new map.")
         dt = elapsed(scan, stamp)
         if scan.odometry is None or odometry is None:
-            change = max(dt, self._period) * np.array([s.speed_change, s.speed_change, s.turn_change])
-            return dt, UncertainPose(self._motion, np.diag(change**2) + _FLOOR)
+            return dt, UncertainPose(self._motion.step, self._change(dt) + _FLOOR)
         motion = relative(odometry, scan.odometry)
         if (way := float(np.hypot(*motion[:2]))) > (most := s.max_step * max(dt, 1.0)):
             raise MotionError(
@@ -180,6 +183,26 @@ class FrontEnd:
             )
         motion = self._wheels.corrected(motion)
         return dt, UncertainPose(motion, s.odometry.covariance(motion) + _FLOOR)
+
+    def _farther(self, driven: UncertainPose, scan: Scan) -> UncertainPose:
+        """A motion as uncertain as it is where scans do not tell it for long."""
+        if scan.odometry is not None:
+            return driven
+        return UncertainPose(driven.pose, driven.covariance + self._motion.longer)
+
+    def _go_on(self, scan: Scan, guess: UncertainPose, found: UncertainPose, dt: float, on: bool) -> None:
+        """Learn how the sensor moves, which is all that tells where it goes when neither wheels nor scans do."""
+        if scan.odometry is not None:
+            self._motion.begin(relative(self._known.pose, found.pose))
+        self._motion.find(self._known, guess, found, min(dt, 1.0) * self._change(dt))
+        if not on:
+            self._motion.stop()
+
+    def _change(self, dt: float) -> Array:
+        """(3, 3) of a step, by how much speeds may differ from those of the step before it."""
+        s = self._settings
+        change = max(dt, self._period) * np.array([s.speed_change, s.speed_change, s.turn_change])
+        return np.diag(change**2)
 
     def _leaves(self, pose: Array, inliers: float) -> bool:
         """True if a scan at this pose from its keyframe is to be one itself."""
