@@ -239,3 +239,18 @@ def test_what_was_put_into_a_room_is_held_against_a_place_once():
         assert found.found
         assert found.against > 0.15
         assert np.abs(pose_difference(found.pose, pose)).max() < 0.08
+
+
+def test_a_place_where_half_of_the_rays_go_through_a_wall_of_the_map_is_none():
+    """All points lie on walls of the map, but for a partition that it has, and the scan was taken without."""
+    room = rectangular_room(10, 6)
+    parted = World(np.concatenate([room.walls, [[[0.5, -3], [0.5, 3]], [[0.54, 3], [0.54, -3]]]]))
+    rng = np.random.default_rng(5)
+    poses = np.array([[x, y, rng.uniform(-3, 3)] for x in (-4, -2.5, -1, 2, 3.5) for y in (-2, 0, 2)])
+    relocator = Relocator(build_grid([scan_at(parted, pose, k) for k, pose in enumerate(poses)], poses))
+    pose = np.array([-0.5, 0.3, 0.4])
+    query = query_of([scan_at(room, pose)])
+    found = relocator.find_near(query, guess(pose))
+    assert found.verdict == "no fit"
+    assert found.fit > 0.9
+    assert relocator.find_near(query_of([scan_at(parted, pose)]), guess(pose)).found
