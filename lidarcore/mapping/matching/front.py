@@ -77,7 +77,10 @@ class FrontEnd:
                 scan, seen = corrected, patches(corrected, self._settings.match)
                 registered = self._map.registered_again(seen, guess, registered.pose)
         rival = self._map.rival(seen, guess, registered)
-        on = registered.inliers >= self._settings.inliers and rival is None
+        fits = registered.inliers >= self._settings.inliers and not self._map.is_chance(
+            seen, guess, registered
+        )
+        on = fits and rival is None
         matched = self._map.tie(registered) if on else guess
         tie = UncertainPose(matched.pose, matched.covariance + self._sweep.covariance)
         if rival is not None:

@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
-from lidarcore.mapping.doubt import DOUBTFUL, loss
+from lidarcore.mapping.doubt import DOUBTFUL, evidence, loss
 from lidarcore.mapping.matching.correlative import arm, search
 from lidarcore.mapping.matching.patches import Patches, joined, placed
 from lidarcore.mapping.matching.registration import Registration, information_of, register
@@ -99,6 +99,14 @@ class LocalMap:
                 return other.pose
             besides = np.concatenate([besides, start[None]])
         return None
+
+    def is_chance(self, seen: Patches, guess: UncertainPose, registered: Registration) -> bool:
+        """Whether a scan that contradicts the guess fits no better than that costs: some of it fits anywhere."""
+        x, P = UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        off = pose_difference(registered.pose, x)
+        contradiction = float(off @ information_of(P) @ off)
+        worth = evidence(registered.inliers, len(seen.near.means))
+        return contradiction > DOUBTFUL and worth < loss(contradiction, DOUBTFUL) / 2
 
     def either(self, registered: Registration, rival: Array) -> UncertainPose:
         """The pose seen from the keyframe, so uncertain that it may be the rival."""

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.special import rel_entr
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import UncertainPose, act, compose, largest_variance, relative, rotate, rotation, wrap
+from lidarcore.mapping.doubt import evidence
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.relocation.field import FULL, LEVELS, make_field, searchable
 from lidarcore.mapping.relocation.query import Query
@@ -19,7 +19,6 @@ Verdict = Literal["found", "too few points", "no fit", "several places"]
 
 _APART = (0.8, 0.35)  # m, rad: poses closer than both are one place
 _MOST_PLACES = 12  # where the points fit, from which on nothing tells them apart
-_CHANCE = 1 / 3  # share of a scan's points that fit at a place where it was not taken
 _SURE = 40.0  # log-likelihood ratio that the best of all wrong places reaches for one in 130 scans of another building
 _SIGMAS = 3.0  # of a guess, within which a pose is looked for
 _NEAR_LEVEL = 3  # of the squares in which it is, at least
@@ -87,7 +86,7 @@ class Relocator:
         height, width = self._field.room.shape[1:]
         angles = self._angles(query)
         found = self._best(query, angles, np.arange(len(angles)), LEVELS - 1, (0, 0, width, height))
-        if found is not None and found.found and _evidence(found.fit, len(query.points)) < _SURE:
+        if found is not None and found.found and evidence(found.fit, len(query.points)) < _SURE:
             return replace(found, verdict="too few points")
         return found or _nowhere("no fit")
 
@@ -199,12 +198,6 @@ def _turned(points: Array, angles: Array) -> Turned:
     """The points at headings, from the middle of the sensor's cell."""
     x, y = np.moveaxis(rotate(angles[:, None], points), -1, 0)
     return Turned(np.floor(x + 0.5).astype(np.int32), np.floor(y + 0.5).astype(np.int32))
-
-
-def _evidence(fit: float, points: int) -> float:
-    """Log-likelihood ratio of a place at which points fit that well to one at which they fit by chance."""
-    fit = max(fit, _CHANCE)
-    return points * float(rel_entr(fit, _CHANCE) + rel_entr(1 - fit, 1 - _CHANCE))
 
 
 def _nowhere(verdict: Verdict) -> Relocation:
