@@ -24,7 +24,7 @@ GUESS = UncertainPose(np.zeros(3), np.diag([0.05, 0.05, 0.02]) ** 2)
     [
         ([0.6, 0.1, -1.4], 0.4, True),
         ([0.6, 0.1, -1.4], 0.9, False),
-        ([0.06, 0.02, -0.01], 0.4, False),
+        ([0.06, 0.02, -0.01], 0.35, False),
     ],
     ids=["elsewhere by chance", "wheels slip", "as wheels say"],
 )
