@@ -42,9 +42,12 @@ export function mountView() {
     );
     $("rejection-toggle").replaceChildren(switchRow("Show them in the scene", "view.layers.rejected"));
   });
-  $("legend").open = !narrow.matches;
+  foldLegend();
+  narrow.addEventListener("change", foldLegend);
   for (const key of ["frame", "settings", "methods", "sizes", "localization"]) on([key], refreshLegend);
 }
+
+const foldLegend = () => ($("legend").open = !narrow.matches);
 
 function refreshLegend() {
   const [frame, settings, methods] = ["frame", "settings", "methods"].map(get);

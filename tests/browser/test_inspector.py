@@ -145,6 +145,16 @@ def test_wall_and_corner_lead_to_each_other_and_escape_ends_both(compared: Visit
     expect(card).to_be_hidden()
 
 
+def test_the_legend_folds_when_the_window_becomes_narrow(visit: Callable[..., Visitor]) -> None:
+    page = visit(1400, 900).open().page
+    sensor = page.locator("#legend").get_by_text("Sensor")
+    expect(sensor).to_be_visible()
+    page.set_viewport_size({"width": 390, "height": 844})
+    expect(sensor).to_be_hidden()
+    page.set_viewport_size({"width": 1400, "height": 900})
+    expect(sensor).to_be_visible()
+
+
 def test_card_and_legend_never_lie_on_each_other(visit: Callable[..., Visitor]) -> None:
     visitor = visit(1400, 900).open()
     visitor.server.patch("settings", {"view": {"compare": True}})
