@@ -19,6 +19,7 @@ from lidarcore.mapping.grid import read_ros_map
 pytestmark = pytest.mark.real_data
 BUILDING = DATA / "turtlebot4_rplidar_rosbag2"
 DRIVE = BUILDING / "macfirst_floor_take_2" / "macfirst_floor_take_2_0.db3"
+ELSEWHERE = DATA / "ccny_hokuyo_rosbag1" / "demo.bag"
 NAME = "mac_1st_floor_final"
 
 
@@ -78,6 +79,7 @@ def test_a_scan_that_is_not_found_in_the_map_is_drawn_faintly_and_without_an_ell
     visit: Callable[..., Visitor], building: np.ndarray
 ) -> None:
     visitor = visit(1400, 900).open()
+    visitor.server.show(ELSEWHERE, 0)
     visitor.page.get_by_role("tab", name="Map").click()
     expect(visitor.page.locator("#pose-panel-state")).to_have_text("Not found in the map yet")
     wait_until(lambda: pixels_of(visitor, "tentative") > 50, "its points are faint")
@@ -91,6 +93,7 @@ def test_of_a_pose_that_is_lost_the_page_says_so_in_sensible_figures(
 ) -> None:
     visitor = visit(1400, 900).open()
     server, page = visitor.server, visitor.page
+    server.show(ELSEWHERE, 0)
     page.get_by_role("tab", name="Map").click()
     vague = {"x": 0, "y": -20, "heading": 0, "sigma_position": 20, "sigma_heading": 3}
     server.api.post("pose", json=vague).raise_for_status()
