@@ -41,7 +41,7 @@ def covariances(refined: Refined, local: Array, numbers: Ints, ties: Ties) -> Ar
     is_between = np.ones(len(ties.nodes), np.bool_)
     is_between[numbers] = False
     nodes, poses, own = ties.nodes.copy(), ties.poses.copy(), ties.sweeps.copy()
-    share = _replaced(refined.poses, local, np.diagonal(ties.matched[numbers], axis1=1, axis2=2))
+    share = _replaced(refined, local, np.diagonal(ties.matched[numbers], axis1=1, axis2=2))
     own[numbers] = refined.sweeps
     reduced = _reduced(ties.matched[is_between], ties.driven[is_between], share)
     own[is_between] += turned(reduced, -poses[is_between, 2])  # seen from the scans
@@ -55,21 +55,22 @@ def covariances(refined: Refined, local: Array, numbers: Ints, ties: Ties) -> Ar
     return P
 
 
-def kept(poses: Array, local: Array, scatter: Array) -> float:
+def kept(refined: Refined, local: Array, scatter: Array) -> float:
     """Share of the errors with which the front end placed keyframes that the finished map has, too.
 
     scatter (K, 3) are the variances of these errors; those of the map are taken for as large.
     """
-    return max(0.0, 1 - _replaced(poses, local, scatter) / 2)
+    return max(0.0, 1 - _replaced(refined, local, scatter) / 2)
 
 
-def _replaced(poses: Array, local: Array, variances: Array) -> float:
-    """Share of variances (K, 3) by which the map places keyframes otherwise than the front end."""
-    if len(poses) < 2:
+def _replaced(refined: Refined, local: Array, variances: Array) -> float:
+    """Share of variances (K, 3) by which the map places keyframes otherwise than the front end, where surfaces tell."""
+    if not refined.joined.any():
         return 1.0
+    poses = refined.poses
     off = pose_difference(relative(poses[:-1], poses[1:]), relative(local[:-1], local[1:]))
     squares = off**2 / (variances[1:] + variances[:-1])
-    return float(np.minimum(squares, _LARGEST).mean())
+    return float(np.minimum(squares, _LARGEST)[refined.joined].mean())
 
 
 def _reduced(matched: Array, driven: Array, share: float) -> Array:

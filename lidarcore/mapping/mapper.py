@@ -100,7 +100,7 @@ class Mapper:
         refined = self._back.refine()
         of_keyframes = [self._motions[number] for number in self._numbers]
         scatter = np.array([motion.scatter for motion in of_keyframes])
-        share = kept(refined.poses, np.array(self._locals), scatter)
+        share = kept(refined, np.array(self._locals), scatter)
         self._refined = replace(refined, sweeps=np.array([motion.stands(share) for motion in of_keyframes]))
         self._loops = len(self._back.loops)
 

@@ -25,9 +25,14 @@ def chain(nodes):
     return graph
 
 
+def steps(graph):
+    """Covariances of a chain's edges."""
+    return np.array([graph.edge(number).covariance for number in range(len(graph) - 1)])
+
+
 def test_parts_are_known_as_far_as_the_graph_says():
     graph = chain(160)
-    found = known(graph, 0.5)
+    found = known(graph, 0.5, steps(graph))
     middles = np.arange(10) * 16 + 8
     for a, i in enumerate(middles):
         for b, j in enumerate(middles):
@@ -35,6 +40,22 @@ def test_parts_are_known_as_far_as_the_graph_says():
             assert found.pairs[a, b] == (np.sqrt(P[0, 0] + P[1, 1]) < 0.5)
     assert not found.pairs[0, 9]
     assert (found.part == np.arange(160) // 16).all()
+
+
+def test_a_part_ends_where_the_step_to_the_next_keyframe_is_vague():
+    """Steps of 0.3 m deviation and 0.1 m: by hand, parts of 9 and 6 keyframes, which no pair of neighbours joins."""
+    variances = np.array([0.01] * 8 + [0.09] + [0.01] * 5)
+    covariances = np.zeros((14, 3, 3))
+    covariances[:, 0, 0], covariances[:, 1, 1], covariances[:, 2, 2] = variances, 1e-4, 1e-6
+    graph = PoseGraph()
+    for k, P in enumerate(covariances):
+        graph.connect(k, graph.add([0.5 * (k + 1), 0, 0]), [0.5, 0, 0], P)
+    found = known(graph, 0.3, covariances)
+    assert found.part.tolist() == [0] * 9 + [1] * 6
+    assert not found.pairs[0, 1]
+    found = known(graph, 0.4, covariances)  # 0.16: the sum goes beyond at the tenth keyframe, no step does
+    assert found.part.tolist() == [0] * 9 + [1] * 6
+    assert found.pairs.all()
 
 
 def test_keyframes_near_others_that_are_not_known_from_there_are_found():
@@ -51,12 +72,14 @@ def test_keyframes_near_others_that_are_not_known_from_there_are_found():
 
 def test_a_loop_makes_the_way_home_known():
     graph = chain(160)
-    parts = known(graph, 1.0)
+    parts = known(graph, 1.0, steps(graph))
     assert not parts.pairs[0, 9]
     graph.connect(0, 159, relative(graph.poses[0], graph.poses[159]), STEP, doubted=True)
     graph.optimize()
-    assert known(graph, 1.0).pairs[0, 9]
-    assert (known_besides(parts, graph, 1.0).pairs == (parts.pairs | known(graph, 1.0).pairs)).all()
+    assert known(graph, 1.0, steps(graph)).pairs[0, 9]
+    assert (
+        known_besides(parts, graph, 1.0).pairs == (parts.pairs | known(graph, 1.0, steps(graph)).pairs)
+    ).all()
     assert (known_besides(parts, chain(160), 0.0).pairs == parts.pairs).all()
 
 
@@ -147,3 +170,20 @@ def test_a_pass_that_no_loop_ties_is_not_taken_for_another_one(data):
         mapper.covariances() + np.diag([0.3, 0.3, 0.02]) ** 2
     )  # a building of 60 m: the reference is off, too
     assert squared_mahalanobis(off, claimed)[-20:].max() < chi_square_gate(0.99, 3)
+
+
+def test_surfaces_along_a_corridor_are_not_taken_for_the_same_where_nothing_tells_the_way(data):
+    """A real RPLIDAR stands in a corridor and is carried twice by 0.2 m, which nothing tells: the drive runs away.
+
+    Surfaces had been taken for the same ones all along, and a finished map been sure, to 2 cm, of 0.6 m too little.
+    """
+    scans = list(open_recording(data / "rplidar_csv_rooms" / "mapping_keng.csv.gz"))[3300:4060]
+    mapper = Mapper()
+    for scan in scans:
+        mapper.step(scan)
+    mapper.finish()
+    true = 0.4 * np.array([0.97, -0.25])  # along the corridor, by the steps in NOTE.txt: 0.16 to 0.24 m
+    off = mapper.trajectory()[1][-1, :2] - true
+    P = mapper.covariances()[-1]
+    assert off @ np.linalg.solve(P[:2, :2] + np.eye(2) * 0.1**2, off) < chi_square_gate(0.99, 2)
+    assert P[2, 2] < 0.5**2  # walls on both sides tell the heading, as they did on the way

@@ -11,7 +11,7 @@ from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.compiled import kernel
 from lidarcore.geometry import UncertainPose
 
-_TOGETHER = 16  # successive keyframes that are judged as one part of the way
+_TOGETHER = 16  # successive keyframes that are judged as one part of the way, at most
 
 
 class JointPoses(Protocol):
@@ -36,11 +36,32 @@ class Known(NamedTuple):
     pairs: Bools
 
 
-def known(joint: JointPoses, within: float) -> Known:
-    """The parts of a way; two are known if the place of one, seen from the other, has a deviation below `within` m."""
-    part = np.arange(len(joint.poses)) // _TOGETHER
-    distance = np.abs(np.subtract.outer(np.arange(part[-1] + 1), np.arange(part[-1] + 1)))
-    return known_besides(Known(part, distance <= 1), joint, within)
+def known(joint: JointPoses, within: float, steps: Array) -> Known:
+    """The parts of a way; two are known if the place of one, seen from the other, has a deviation below `within` m.
+
+    steps (K - 1, 3, 3) are the covariances of the keyframes, each seen from the one before it. Neighbours are known if
+    the step between them is.
+    """
+    part, reached = _parts(steps[:, 0, 0] + steps[:, 1, 1], within**2)
+    pairs = np.eye(part[-1] + 1, dtype=bool)
+    a = np.flatnonzero(reached)
+    pairs[a, a + 1] = pairs[a + 1, a] = True
+    return known_besides(Known(part, pairs), joint, within)
+
+
+def _parts(variances: Array, most: float) -> tuple[Ints, Bools]:
+    """Numbers (K,) of the parts, in which the variances (K - 1,) m² of the steps add up to less than `most`.
+
+    And whether each part but the first was reached from the one before it by a step that is known as well.
+    """
+    part, reached = np.zeros(len(variances) + 1, np.int64), []
+    count, total = 1, 0.0
+    for k, variance in enumerate(variances.tolist(), 1):
+        count, total, part[k] = count + 1, total + variance, part[k - 1]
+        if count > _TOGETHER or total >= most:
+            count, total, part[k] = 1, 0.0, part[k - 1] + 1
+            reached.append(variance < most)
+    return part, np.array(reached, bool)
 
 
 def known_besides(parts: Known, joint: JointPoses, within: float) -> Known:
@@ -62,7 +83,8 @@ def near_unknown(joint: JointPoses, known: Known, distance: float) -> Ints:
 
 
 def _middle(parts: Known, number: int) -> int:
-    return min(number * _TOGETHER + _TOGETHER // 2, len(parts.part) - 1)
+    first, end = np.searchsorted(parts.part, [number, number + 1]).tolist()
+    return int(first + end) // 2
 
 
 def _is_known(joint: JointPoses, i: int, j: int, within: float) -> bool:

@@ -85,6 +85,10 @@ class PoseGraph:
         self._recovery = self._extended(i, j, P, doubted)
         return len(self._ends) - 1
 
+    def edge(self, number: int) -> UncertainPose:
+        """T_i_j (3,) as an edge has it, and its covariance (3, 3)."""
+        return UncertainPose(self._relatives[number].copy(), np.linalg.inv(self._informations[number]))
+
     def amend(self, edge: int, change: Array) -> None:
         """Change (3,) the relative pose of an edge, which is known as well as before."""
         self._relatives[edge] += change

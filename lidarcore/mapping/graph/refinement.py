@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.sparse import csc_array, diags_array
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import (
     UncertainPose,
     compose,
@@ -38,7 +38,7 @@ _LARGEST = 9.0  # a group whose squared residual is more than this many times as
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
-    """How keyframe j was reached from keyframe i as far as motion alone tells: T_i_j (3,), covariance (3, 3)."""
+    """How keyframe j was reached from keyframe i, but for the surfaces that tie them: T_i_j (3,), covariance (3, 3)."""
 
     i: int
     j: int
@@ -51,12 +51,14 @@ class Refined:
     """Poses (K, 3) with their joint covariance; and what was measured of the surfaces.
 
     sweeps      (K, 3, 3) covariance that each pose has besides, seen from itself: of where its scan stands
+    joined      (K - 1,) whether surfaces tie a keyframe to the next one; else only the step between them does
     scale       times the patches' own variances, which noise really has
     unevenness  m, standard deviation that all patches of one view of one place share
     """
 
     poses: Array
     sweeps: Array
+    joined: Bools
     scale: float
     unevenness: float
     _recovery: Recovery
@@ -111,7 +113,8 @@ def refine(
     sweeps (K, 3, 3) are covariances of where each scan stands beside its pose; they move nothing.
     assumed m is the unevenness that the patches' variances contain: it is measured here, and would count twice.
     known tells which parts of the way may be taken to have seen the same surfaces; None: all.
-    steps tie keyframes by odometry or the going on of the motion: what is known where surfaces say nothing.
+    steps tie keyframes by what is known where surfaces say nothing: by odometry or the going on of the motion, and by
+    what was seen as well between keyframes that `known` does not join.
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
@@ -127,9 +130,16 @@ def refine(
         if np.abs(step).max() < _SETTLED:
             break
     equations, _ = normal_equations(seen, poses, islands, size, scale, unevenness, known)
-    return Refined(
-        poses, sweeps, scale, unevenness, Recovery(factor(_with_steps(equations, poses, steps)[0]))
-    )
+    recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
+    return Refined(poses, sweeps, _joined(known, len(poses)), scale, unevenness, recovery)
+
+
+def _joined(known: Known | None, keyframes: int) -> Bools:
+    """As said of Refined."""
+    if known is None:
+        return np.ones(max(keyframes - 1, 0), np.bool_)
+    found: Bools = known.pairs[known.part[:-1], known.part[1:]]
+    return found
 
 
 def _observations(scans: list[Patches], assumed: float) -> Observations:

@@ -31,12 +31,10 @@ _SETTLED = 0.01  # m and rad of the last step, after which the poses are far bet
 class _Driven(NamedTuple):
     """How a keyframe's edge hangs on odometry.
 
-    edge   number in the graph
     taken  (3,) errors of odometry that were taken out
     share  (3, 3) of the motion by odometry that is in the edge: nearly none where scans tell it
     """
 
-    edge: int
     taken: Array
     share: Array
 
@@ -56,6 +54,7 @@ class BackEnd:
         self.loops: list[Loop] = []
         self.keyframes: dict[int, Keyframe] = {}
         self.steps: list[Step] = []
+        self._edges: list[int] = []  # of the graph, which tie the same keyframes by what was seen as well
         self._driven: dict[int, _Driven] = {}  # by the number of the step
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
@@ -73,9 +72,9 @@ class BackEnd:
         node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
         self.keyframes[node] = _keyframe(tracked)
         self.steps.append(Step(tracked.node, node, *tracked.moved))
-        edge = self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance)
+        self._edges.append(self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance))
         if tracked.wheels is not None and not tracked.island:
-            self._driven[len(self.steps) - 1] = _Driven(edge, tracked.wheels, _share(tracked))
+            self._driven[len(self.steps) - 1] = _Driven(tracked.wheels, _share(tracked))
         if tracked.island:
             self._islands.begin(node)
         self._join(node)
@@ -107,7 +106,7 @@ class BackEnd:
             step = self.steps[number]
             change = effects(step.pose) @ (errors - driven.taken)
             self.steps[number] = replace(step, pose=step.pose + change)
-            self.graph.amend(driven.edge, driven.share @ change)
+            self.graph.amend(self._edges[number], driven.share @ change)
             self._driven[number] = driven._replace(taken=errors)
         if self._driven:
             self.graph.optimize(_SETTLED)
@@ -119,7 +118,7 @@ class BackEnd:
         not known, seen from each other, are not taken for the same ones. What that leaves open may be little enough to
         tell one door of a corridor from the next.
         """
-        parts = known(self.graph, self._settings.front.match.reach)
+        parts = self._parts()
         nodes = near_unknown(self.graph, parts, self._settings.loops.farthest)
         if not len(nodes):
             return 0
@@ -138,7 +137,7 @@ class BackEnd:
         says where they lie: else surfaces would be taken for the same ones that are not, and the map be wrong and sure.
         """
         self.graph.optimize()
-        parts = known(self.graph, self._settings.front.match.reach)
+        parts = self._parts()
         while True:
             refined = self._refined(parts)
             self.graph.move(refined.poses)
@@ -149,12 +148,24 @@ class BackEnd:
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
         return refined
 
+    def _parts(self) -> Known:
+        steps = [self.graph.edge(edge).covariance for edge in self._edges]
+        return known(self.graph, self._settings.front.match.reach, np.reshape(steps, (-1, 3, 3)))
+
+    def _steps(self, parts: Known) -> list[Step]:
+        """By motion alone where surfaces tell the rest; by what was seen where they need not be the same."""
+        part = parts.part
+        return [
+            step if parts.pairs[part[step.i], part[step.j]] else Step(step.i, step.j, *self.graph.edge(edge))
+            for step, edge in zip(self.steps, self._edges, strict=True)
+        ]
+
     def _refined(self, parts: Known) -> Refined:
         match, sweeps = self._settings.front.match, [keyframe.sweep for keyframe in self.keyframes.values()]
         return refine(
             [keyframe.patches for keyframe in self.keyframes.values()],
             self.graph.poses,
-            self.steps,
+            self._steps(parts),
             self._settings.cell,
             self._islands.numbers,
             np.array(sweeps),
