@@ -1,5 +1,6 @@
 """A sensor without odometry between bare walls: nothing tells how far it goes along them, and that is claimed."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,21 +15,21 @@ from lidarcore.simulation.rooms import rectangular_room
 CORRIDOR = rectangular_room(120, 2.4)
 
 
-def placed(speed: float, seconds: float, reach: float, begin: float) -> list[UncertainPose]:
-    """Where a sensor that sees so far says it is, ten scans a second; it begins there, between the ends at 60 m."""
-    rng, mapper, found = np.random.default_rng(4), Mapper(SETTINGS), []
+def driven(speed: float, seconds: float, reach: float, begin: float) -> Iterator[Mapper]:
+    """The map of a sensor that sees so far, after each of ten scans a second; it begins there, between ends at 60 m."""
+    rng, mapper = np.random.default_rng(4), Mapper(SETTINGS)
     for k in range(int(10 * seconds)):
         scan = full_scan(CORRIDOR, np.array([begin + 0.1 * speed * k, 0.2, 0.0]), NOISE, rng)
         seen = np.where(scan.ranges < reach, scan.ranges, np.nan)
         mapper.step(replace(scan, ranges=seen, stamp=0.1 * k, odometry=None))
-        found.append(mapper.here)
-    return found
+        yield mapper
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.5, 1.0])
 def test_however_it_moves_along_bare_walls_it_is_within_what_is_claimed(speed):
     """Had every step erred by itself, 0.7 m would have been claimed after 20 s."""
-    for k, (pose, covariance) in enumerate(placed(speed, 20, reach=6.0, begin=-10.0)):
+    for k, mapper in enumerate(driven(speed, 20, reach=6.0, begin=-10.0)):
+        pose, covariance = mapper.here
         off = pose - [0.1 * speed * k, 0.0, 0.0]
         assert abs(off[0]) < 3 * np.sqrt(covariance[0, 0]) + 0.01
         assert np.abs(off[1:]).max() < 0.02
@@ -36,9 +37,21 @@ def test_however_it_moves_along_bare_walls_it_is_within_what_is_claimed(speed):
 
 def test_where_scans_tell_the_way_nothing_of_that_is_claimed():
     """At 0.5 m/s towards a wall that it sees."""
-    found = placed(0.5, 8, reach=40.0, begin=50.0)
-    assert abs(found[-1].pose[0] - 3.95) < 0.05
-    assert np.sqrt(found[-1].covariance[0, 0]) < 0.05
+    *_, mapper = driven(0.5, 8, reach=40.0, begin=50.0)
+    assert abs(mapper.here.pose[0] - 3.95) < 0.05
+    assert np.sqrt(mapper.here.covariance[0, 0]) < 0.05
+
+
+@pytest.mark.parametrize("speed", [0.0, 1.0])
+def test_a_finished_map_of_bare_walls_knows_the_heading_and_not_the_way(speed):
+    *_, mapper = driven(speed, 20, reach=6.0, begin=-10.0)
+    mapper.finish()
+    off = mapper.trajectory()[1] - np.outer(0.1 * speed * np.arange(200), [1, 0, 0])
+    deviations = np.sqrt(np.diagonal(mapper.covariances(), axis1=1, axis2=2))
+    assert (np.abs(off[:, 0]) < 3 * deviations[:, 0] + 0.01).all()
+    assert deviations[-1, 0] > 1.0
+    assert np.abs(off[:, 1:]).max() < 0.02
+    assert deviations[:, 2].max() < 0.1
 
 
 def test_errors_of_steps_that_nothing_tells_add_up_themselves():

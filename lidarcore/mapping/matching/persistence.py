@@ -65,11 +65,11 @@ def _untold(guess: Array, found: Array) -> Array:
 
     All of it in directions of which the match says nothing; never more, though a guess that is far off counts less.
     """
-    values, V = np.linalg.eigh(guess)
-    root = V / np.sqrt(values) @ V.T
-    stays, V = np.linalg.eigh(root @ found @ root)
-    directions: Array = V * np.clip(stays, 0.0, 1.0) @ V.T
-    return directions
+    L = np.linalg.cholesky(guess)
+    back = np.linalg.inv(L)
+    stays, V = np.linalg.eigh(back @ found @ back.T)
+    untold: Array = L @ (V * np.clip(stays, 0.0, 1.0)) @ V.T @ back
+    return untold
 
 
 def _within(J: Array, covariance: Array) -> Array:
