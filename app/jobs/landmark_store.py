@@ -5,6 +5,7 @@ from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from lidarcore.errors import MapFileError, UnknownSessionError
 from lidarcore.landmarks import Atlas, LandmarkMap, Session
@@ -20,6 +21,7 @@ from .wall_writer import WallWriter, from_stored, grid_from_stored, grid_to_stor
 from .write_queue import WriteQueue
 
 PATIENCE = 2.0  # s to wait while another process writes
+SLACK = 0.1  # of what a map saw, by which another one of the same may have seen less
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,18 @@ class StoreStatus:
     error: str | None
 
 
+class Span(NamedTuple):
+    """From when to when a map saw something, s, by the clock of what it is of."""
+
+    first: float
+    last: float
+
+    def covers(self, other: "Span") -> bool:
+        """Whether it holds the other one, but for a little at the ends."""
+        little = SLACK * (other.last - other.first)
+        return self.first <= other.first + little and self.last >= other.last - little
+
+
 class LandmarkStore:
     """An atlas of maps, with a thread that writes the running one.
 
@@ -48,7 +62,8 @@ class LandmarkStore:
         self.listeners: list[Callable[[MapChange], None]] = []
         self._run: SessionWriter | None = None
         self._used: int | None = None
-        self._finished: dict[Hashable, int] = {}  # by what is replayed, the session of its last finished map
+        # By what is replayed, the sessions of its finished maps, and from when to when they saw something.
+        self._finished: dict[Hashable, dict[int, Span]] = {}
         self._queue = WriteQueue(self._tell, self._replace_earlier)
 
     def close(self) -> None:
@@ -77,7 +92,8 @@ class LandmarkStore:
     def begin(self, source: str, replay: Hashable = None) -> SessionWriter:
         """A run begins with an empty map of its own, and the one before ends.
 
-        Of runs with the same `replay`, which lead to the same map, the last one that was finished is kept.
+        Of runs with the same `replay`, which lead to the same map, the last one that was finished is kept; one that saw
+        less of it, as it began later or ended sooner, does not take the place of another.
         """
         self.use(None)
         self._run = run = MapWriter(self.atlas, source, self._queue.schedule, replay)
@@ -152,14 +168,23 @@ class LandmarkStore:
         return self.atlas.newest_to_localize_in()
 
     def _replace_earlier(self, run: SessionWriter) -> None:
-        """Give up the map of the run before with the same `replay`, unless it is in use."""
-        if run.replay is None or run.session is None or run.session < self._finished.get(run.replay, 0):
+        """Give up the maps of earlier runs with the same `replay` that saw no more of it, unless they are in use."""
+        if run.replay is None or run.session is None:
             return
-        earlier, self._finished[run.replay] = self._finished.get(run.replay), run.session
-        if earlier is not None and earlier not in (self._used, run.session):
-            with suppress(UnknownSessionError):  # somebody else gave it up
-                self.atlas.delete(earlier)
+        finished = self._finished.setdefault(run.replay, {})
+        with suppress(UnknownSessionError):  # somebody else gave it up
+            finished[run.session] = _span(self.atlas[run.session])
+        for earlier in [session for session in finished if session < run.session and session != self._used]:
+            if run.session in finished and finished[run.session].covers(finished[earlier]):
+                del finished[earlier]
+                with suppress(UnknownSessionError):
+                    self.atlas.delete(earlier)
 
     def _tell(self, change: MapChange) -> None:
         for listener in self.listeners:
             listener(change)
+
+
+def _span(map: LandmarkMap) -> Span:
+    seen = [(mark.first_seen, mark.last_seen) for mark in [*map, *map.walls()]]
+    return Span(min((first for first, _ in seen), default=0.0), max((last for _, last in seen), default=0.0))

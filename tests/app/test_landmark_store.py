@@ -118,10 +118,10 @@ def landmarks_of(name: str) -> np.ndarray:
     return {"xy": np.array([[3, 0]]), "counts": np.array([10]), "last_seen": np.array([5.0])}[name]
 
 
-def finish(store: LandmarkStore, replay: str | None) -> int:
-    """A run with a map, from its beginning to its end; the session."""
+def finish(store: LandmarkStore, replay: str | None, until: float = 5.0) -> int:
+    """A run with a map, from the beginning of what is replayed to `until` s; the session."""
     run = store.begin("room.mcap", replay=replay)
-    run.put(landmarks(2))
+    run.put(landmarks(2, last_seen=np.full(2, until)))
     wait_until(lambda: run.session)
     store.use(None)
     wait_until(lambda: store.atlas.session(run.session).ended)
@@ -139,6 +139,15 @@ def test_only_of_what_is_replayed_a_finished_map_takes_the_place_of_the_one_befo
     run.put(landmarks(2))
     wait_until(lambda: run.session)
     assert [session.id for session in store.atlas.sessions()] == [*left, run.session]
+
+
+def test_a_map_that_saw_less_does_not_take_the_place_of_one_that_saw_all(store: LandmarkStore) -> None:
+    """Both go when the recording was mapped to its end again, or nearly."""
+    all_of_it = finish(store, "again and again")
+    broken_off = finish(store, "again and again", until=2.0)
+    assert [session.id for session in store.atlas.sessions()] == [all_of_it, broken_off]
+    again = finish(store, "again and again", until=4.9)
+    wait_until(lambda: [session.id for session in store.atlas.sessions()] == [again])
 
 
 def test_a_map_in_use_stays_when_its_recording_is_mapped_again(store: LandmarkStore) -> None:
