@@ -171,11 +171,15 @@ class LandmarkStore:
         """Give up the maps of earlier runs with the same `replay` that saw no more of it, unless they are in use."""
         if run.replay is None or run.session is None:
             return
+        try:
+            seen = _span(self.atlas[run.session])
+        except UnknownSessionError:  # somebody else gave it up
+            return
         finished = self._finished.setdefault(run.replay, {})
-        with suppress(UnknownSessionError):  # somebody else gave it up
-            finished[run.session] = _span(self.atlas[run.session])
-        for earlier in [session for session in finished if session < run.session and session != self._used]:
-            if run.session in finished and finished[run.session].covers(finished[earlier]):
+        covered = [session for session, span in finished.items() if seen.covers(span)]
+        finished[run.session] = seen
+        for earlier in covered:
+            if earlier < run.session and earlier != self._used:
                 del finished[earlier]
                 with suppress(UnknownSessionError):
                     self.atlas.delete(earlier)

@@ -161,6 +161,16 @@ def test_a_pose_told_wrongly_is_not_tracked(tracker: WholeScans, drive: list[Sca
     assert np.hypot(*off[:, :2].T).max() < 0.1
 
 
+def test_who_is_lost_with_the_first_scan_is_found_by_the_next_ones(
+    tracker: WholeScans, drive: list[Scan]
+) -> None:
+    """Told to be far outside of the map: what was seen from there is not taken for a view of it."""
+    tracker.place(truth(drive[0]) + np.array([100.0, 0.0, 0.0]), np.diag([2.0, 2.0, 0.3]) ** 2)
+    off = errors(followed(tracker, drive[:200]), drive[:200])
+    assert len(off)
+    assert np.hypot(*off[:, :2].T).max() < 0.1
+
+
 def test_poses_and_covariances_that_are_none_are_refused(tracker: WholeScans) -> None:
     with pytest.raises(LocalizationError, match="pose"):
         tracker.place((0.0, np.nan, 0.0), NEAR)

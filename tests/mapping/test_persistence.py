@@ -54,6 +54,18 @@ def test_a_finished_map_of_bare_walls_knows_the_heading_and_not_the_way(speed):
     assert deviations[:, 2].max() < 0.1
 
 
+def test_keyframes_between_which_nothing_tells_the_way_keep_the_heading_that_was_seen():
+    """At 1 m/s from a wall, which it loses after 3 s, on between bare walls: the drive seems to go on, and may not."""
+    *_, mapper = driven(-1.0, 12, reach=6.0, begin=57.0)
+    mapper.finish()
+    off = mapper.trajectory()[1] + np.outer(0.1 * np.arange(120), [1, 0, 0])
+    deviations = np.sqrt(np.diagonal(mapper.covariances(), axis1=1, axis2=2))
+    assert len(mapper.keyframes.numbers) > 20
+    assert (np.abs(off[:, 0]) < 3 * deviations[:, 0] + 0.01).all()
+    assert deviations[-1, 0] > 1.0
+    assert deviations[:, 2].max() < 0.1
+
+
 def test_errors_of_steps_that_nothing_tells_add_up_themselves():
     """Of a step known to 1 cm, made a hundred times more: a metre, and the speed may have changed besides."""
     motion, exact = Persistence(), np.diag([1e-4, 1e-4, 1e-6]) ** 2

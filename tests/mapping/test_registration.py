@@ -6,7 +6,7 @@ from mapping_scenes import NOISE, full_scan, sick_scan
 from scipy.spatial import cKDTree
 
 from lidarcore import Scan
-from lidarcore.geometry import act, compose, pose_difference, relative
+from lidarcore.geometry import act, compose, pose_difference, relative, rotate
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.matching.correlative import search
 from lidarcore.mapping.matching.patches import joined, patches, placed
@@ -122,6 +122,16 @@ def test_the_search_finds_the_best_pose_of_its_window_and_the_best_one_besides()
     other = search(reference, points, guess, 5 * sigma, settings, found[None])
     away = relative(found, other)
     assert np.hypot(*away[:2]) > 0.4 or abs(away[2]) > 0.24
+
+
+@pytest.mark.parametrize("turn", [0.0, np.pi / 2])
+def test_a_search_looks_as_far_to_one_side_as_to_the_other(turn):
+    """What is seen lies 11 m ahead, and the guess 7 m behind."""
+    seen = np.stack([np.linspace(10, 12, 60), np.linspace(-2, 2, 60) ** 2], -1)
+    ahead = rotate(turn, np.array([1.0, 0.0]))
+    sigma = np.array([*np.abs(rotate(turn, np.array([2.5, 0.1]))), 0.02])
+    found = search(rotate(turn, seen) + 7 * ahead, rotate(turn, seen), np.zeros(3), sigma, MatchSettings())
+    assert np.abs(found - [*(7 * ahead), 0.0]).max() < 0.1
 
 
 def _score(reference, points, pose, turn, guess, sigma, settings):

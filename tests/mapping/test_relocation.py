@@ -142,6 +142,10 @@ def test_maps_too_large_to_be_searched_at_once_are_searched_in_larger_cells(monk
 
 def test_too_few_points_and_empty_maps_say_so():
     assert Relocator(furnished()).find(query_of([Scan([1.0, 2.0], [0.0, 1.0])])).verdict == "too few points"
+    nothing = Scan(np.full(90, np.nan), np.deg2rad(np.arange(90)))
+    assert (
+        Relocator(furnished()).find_near(query_of([nothing]), guess(np.zeros(3))).verdict == "too few points"
+    )
     with pytest.raises(LocalizationError, match="occupied"):
         Relocator(OccupancyGrid(np.zeros((5, 5)), 0.05, np.zeros(3)))
     with pytest.raises(LocalizationError):

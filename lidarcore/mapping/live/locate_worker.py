@@ -95,7 +95,7 @@ class LocateWorker(Background):
 
     def _go_on(self, tracked: Tracked) -> None:
         """Go on to the next keyframe, by the front end alone, or take the first one anew."""
-        if tracked.first is not None:
+        if tracked.first is not None and self._recent:
             self._recent[-1] = tracked.first.scan, self._local
         if not tracked.keyframe:
             return

@@ -61,7 +61,7 @@ def search(
     cell = settings.cell * (2 if most[:2].max() > _WIDE else 1)
     near = points[np.hypot(*points.T) < settings.horizon]
     near = near[:: max(1, len(near) // _ENOUGH)]
-    kept = reference[np.hypot(*(reference - guess[:2]).T) < settings.horizon + most[0]]
+    kept = reference[np.hypot(*(reference - guess[:2]).T) < settings.horizon + most[:2].max()]
     if not len(near) or not len(kept):
         return guess
     low, fine = _grid(kept, cell, max(settings.blur, cell))

@@ -96,9 +96,9 @@ class Relocator:
         If it is not found there, the answer says how well the guess itself fits. Only places near the guess are
         rivals.
         """
-        angles, at = self._angles(query), self._in_field(guess.pose)
         if len(query.points) < self.settings.least_points:
             return _nowhere("too few points")
+        angles, at = self._angles(query), self._in_field(guess.pose)
         turn = max(_SIGMAS * np.sqrt(guess.covariance[2, 2]), _APART[1])
         near = np.flatnonzero(np.abs(wrap(angles - at[2])) <= turn)
         spread = _SIGMAS * np.sqrt(float(largest_variance(guess.covariance[:2, :2])))
