@@ -4,13 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array
 
 from lidarcore import SensorNoise
 from lidarcore.errors import LocalizationError
 from lidarcore.evaluation.maps.honesty import drive
 from lidarcore.geometry import pose_difference, relative, rotation, squared_mahalanobis
 from lidarcore.mapping import Mapper, MapperSettings
-from lidarcore.mapping.between import _reduced
+from lidarcore.mapping.between import _reduced, kept
+from lidarcore.mapping.graph.recovery import Recovery, factor
+from lidarcore.mapping.graph.refinement import Refined
 
 SETTINGS = MapperSettings().with_noise(SensorNoise(0.01, 0.001))
 
@@ -90,3 +93,19 @@ def test_here_is_where_the_newest_scan_was_placed_and_a_map_without_scans_is_ref
         np.testing.assert_allclose(mapper.here.pose, placed.pose, atol=1e-12)
     np.testing.assert_allclose(mapper.here.covariance, mapper.covariances()[-1], rtol=1e-9)
     assert len(mapper.keyframes.poses) > 3
+
+
+@pytest.mark.parametrize("joined", [[True, True, False], [False, False, False]])
+def test_what_the_map_keeps_of_errors_is_told_by_keyframes_that_surfaces_tie(joined):
+    """It moved the second and third by their own deviation each, and left the step to the fourth as it was."""
+    local = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]])
+    poses = local + np.cumsum([np.zeros(3), np.full(3, 0.1), np.full(3, 0.1), np.zeros(3)], axis=0) * [
+        1,
+        1,
+        0,
+    ]
+    scatter = np.full((4, 3), 0.1**2 / 2)
+    recovery = Recovery(factor(csc_array(np.eye(12))))
+    refined = Refined(poses, np.zeros((4, 3, 3)), np.array(joined), 1.0, 0.0, recovery)
+    found = kept(refined, local, scatter)
+    assert found == pytest.approx(1 - (2 / 3 if any(joined) else 1) / 2)
