@@ -187,7 +187,8 @@ class Navigator:
         self._continuity.accept(now)
         self._reckoning.carry(now, estimate.pose)
         self._estimate = estimate
-        return self._judge(running) or message or self._about_odometry(running, now)
+        told = self._judge(running), message or self._about_odometry(running, now)
+        return " ".join(filter(None, told)) or None
 
     def _running(self, now: Instant) -> Filter:
         """The filter, made at the first scan; moved by odometry if there is any and the settings allow."""

@@ -19,6 +19,7 @@ from lidarcore.geometry import (
     squared_mahalanobis,
     wrap,
 )
+from lidarcore.localization.coincidence import false_alarms
 from lidarcore.localization.points import Points
 
 _FAR = 6.0  # standard deviations; what is known of a pose after a gap is rough
@@ -30,6 +31,7 @@ _ROUNDS = 4
 _MOST_PAIRS = 4_000_000  # of landmarks, within the longest distance seen
 _MOST_POSES = 50_000  # hypotheses that are compared with the whole scan
 _MOST_REFINED = 100  # hypotheses, the best ones, of which least squares are worth it
+_BELIEVED = 0.01  # poses tried that may explain as much by chance
 _TOO_LARGE = "A map of {} landmarks is too large to search without a guess: say where the sensor is."
 
 
@@ -78,6 +80,12 @@ def relocalize(observed: Points, landmarks: Points, near: tuple[Array, Array] | 
         raise LostError(
             f"Several poses explain {len(found[0].pairs)} of the {len(observed)} points seen, such as "
             f"{found[0].pose.round(2)} and {found[1].pose.round(2)}: move the sensor, or set the pose by hand."
+        )
+    if false_alarms(found[0].pose, found[0].pairs, observed, landmarks, len(poses)) > _BELIEVED:
+        raise LostError(
+            f"The pose was not found: {len(found[0].pairs)} of the {len(observed)} points seen match the map at "
+            f"{found[0].pose.round(2)}, but as many may match by chance elsewhere. "
+            "Move the sensor and try again, or set the pose by hand."
         )
     return found[0]
 

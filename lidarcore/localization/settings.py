@@ -169,7 +169,7 @@ class LocalizationSettings:
         1,
         1e3,
         "",
-        "a pair is ambiguous if it is not this many times likelier than another. "
+        "a pair is ambiguous if it is not this many times likelier than another, or in a known map than chance. "
         "More: fewer wrong pairs, more that are left out",
         default=10.0,
     )

@@ -24,7 +24,8 @@ class Association:
     """Indices of observations and landmarks; every observation is in exactly one of the groups.
 
     observed, landmark  (P,) pairs that are used
-    ambiguous           (A, 2) observation and landmark of pairs with a rival almost as likely: not used
+    ambiguous           (A, 2) observation and landmark of pairs with a rival almost as likely, or that may be chance:
+                        not used
     incompatible        (J, 2) of pairs that contradict the others: not used
     unmatched           (U,) observations without a landmark in their gate, some of them
     new                 (N,) far from every landmark of their kind
@@ -52,6 +53,11 @@ class Association:
         return replace(
             self, observed=self.observed[used], landmark=self.landmark[used], tentative=pairs[~used]
         )
+
+    def doubted(self) -> "Association":
+        """This association with all of its pairs moved to the ambiguous ones."""
+        none, pairs = np.empty(0, np.int64), np.stack([self.observed, self.landmark], -1)
+        return replace(self, observed=none, landmark=none, ambiguous=np.vstack([self.ambiguous, pairs]))
 
     def of(self, landmarks: Ints) -> "Association":
         """This association with indices into the whole map, of which only these landmarks (L,) were looked at."""

@@ -30,6 +30,10 @@ class Innovation:
         """nu^T S^-1 nu: chi-square distributed with 2 P degrees of freedom if the filter is honest."""
         return float(squared_mahalanobis(self.value.ravel(), self.covariance))
 
+    def doubted(self) -> "Innovation":
+        """This innovation without any of its pairs, as they may be chance."""
+        return Innovation(self.association.doubted(), np.empty((0, 2)), np.empty((0, 0)))
+
     def compatible(self, probability: float) -> tuple["Innovation", Ints]:
         """Leave out pairs until the others are jointly compatible; also which pairs (P,) were kept."""
         kept, innovation = np.arange(len(self.value)), self

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, act_inverse, chi_square_gate, rotation
+from lidarcore.localization.coincidence import densities, evidence
 from lidarcore.localization.ekf import kernels
 from lidarcore.localization.ekf.association import match
 from lidarcore.localization.ekf.estimate import Estimate, Innovation, Instant, as_pose
@@ -37,7 +38,7 @@ class Localizer:
         covariance: ArrayLike,
         settings: LocalizationSettings | None = None,
     ) -> None:
-        self.landmarks = landmarks
+        self.landmarks, self._density = landmarks, densities(landmarks)
         self.settings = settings or LocalizationSettings()
         self._motion = motion_model(self.settings, with_velocity=False)
         self._last: Instant | None = None
@@ -108,6 +109,9 @@ class Localizer:
         innovation, kept = Innovation(association, observed.xy[i] - z[j], S_pairs).compatible(
             self.settings.gate
         )
+        told = evidence(innovation.value, innovation.covariance, self._density[j[kept]])
+        if told < np.log(self.settings.ambiguity):
+            return innovation.doubted()
         kernels.correct(x, P, len(x), z[j[kept]], innovation.value, noise[kept], given[kept])
         return innovation
 

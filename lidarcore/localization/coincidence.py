@@ -1,0 +1,57 @@
+"""What of a scan lies on landmarks by chance: a pose found, and a single pair."""
+
+import numpy as np
+from scipy.stats import binom
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import act, chi_square_gate, rotation, squared_mahalanobis
+from lidarcore.localization.points import Points
+
+_GATE = chi_square_gate(0.999)  # of what is called lying on a landmark
+_FIXED = 2  # points that a pose is made from lie on landmarks whatever it is
+
+
+def false_alarms(pose: Array, pairs: Ints, observed: Points, landmarks: Points, tried: int) -> float:
+    """How many of so many poses tried would bring as many points onto landmarks, were these scattered evenly.
+
+    A contrario, after Desolneux, Moisan and Morel (2000).
+    pose   (3,) T_world_sensor of one of them, which has these pairs (P, 2) of points seen and landmarks
+    """
+    i, j = pairs.T
+    R_world_sensor = rotation(pose[2])
+    seen = R_world_sensor @ observed.covariance @ R_world_sensor.T
+    apart = act(pose, observed.xy[i]) - landmarks.xy[j]
+    on = int((squared_mahalanobis(apart, seen[i] + landmarks.covariance[j]) < _GATE).sum())
+    share = float(_covered(seen, observed, landmarks).mean())
+    return tried * float(binom.sf(on - _FIXED - 1, len(observed) - _FIXED, share))
+
+
+def _covered(seen: Array, observed: Points, landmarks: Points) -> Array:
+    """Share (K,) of the landmarks' area in which a point with this covariance (K, 2, 2) lies on one of its kind."""
+    gates = np.pi * _GATE * np.sqrt(np.linalg.det(seen[:, None] + landmarks.covariance))
+    alike = np.asarray(observed.kinds)[:, None] == np.asarray(landmarks.kinds)
+    return np.minimum((gates * alike).sum(axis=1) / _area(landmarks), 1.0)
+
+
+def _area(landmarks: Points) -> float:
+    """m² over which landmarks lie: an even spread over a rectangle of sides a and b has variances a²/12 and b²/12."""
+    spread = np.cov(landmarks.xy.T) if len(landmarks) > 1 else np.zeros((2, 2))
+    return float(12 * np.sqrt(np.linalg.det(spread + landmarks.covariance.mean(axis=0))))
+
+
+def densities(landmarks: Points) -> Array:
+    """How many landmarks of its kind there are for each landmark (L,), 1/m²."""
+    kinds, index, counts = np.unique(np.asarray(landmarks.kinds), return_inverse=True, return_counts=True)
+    per_area: Array = counts[index] / _area(landmarks) if len(kinds) else np.empty(0)
+    return per_area
+
+
+def evidence(difference: Array, covariance: Array, density: Array) -> float:
+    """Log of how many times likelier points are these landmarks than things no map holds, were there as many of those.
+
+    difference, covariance  (P, 2) m and (2 P, 2 P) m² of where they are seen, less where the landmarks are expected
+    density                 (P,) 1/m² of landmarks, and so of other things
+    """
+    d = squared_mahalanobis(difference.ravel(), covariance)
+    log_likelihood = -0.5 * (d + np.linalg.slogdet(2 * np.pi * covariance)[1])
+    return float(log_likelihood - np.log(density).sum())
