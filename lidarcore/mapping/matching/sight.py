@@ -10,21 +10,31 @@ from lidarcore.geometry import wrap
 from lidarcore.geometry.kernels import rotate
 from lidarcore.scan import Scan
 
-_APART = 0.1  # rad between beams from which on the sensor did not look between them
+_APART, _BEAMS = (
+    0.1,
+    2.0,
+)  # rad, and beams' spacing, between returns beyond which nothing was seen between them
 
 
 class Sight(NamedTuple):
-    """The returns of a scan in the order of their bearings: bearings (N,) rad in (-pi, pi], ranges (N,) m."""
+    """The returns of a scan in the order of their bearings.
+
+    bearings  (N,) rad in (-pi, pi]
+    ranges    (N,) m
+    apart     rad between two of them from which on nothing is known of what lies between
+    """
 
     bearings: Array
     ranges: Array
+    apart: float
 
 
 def sight(scan: Scan) -> Sight:
     """The returns of a scan."""
     bearings = wrap(scan.bearings[scan.valid])
     order = np.argsort(bearings, kind="stable")
-    return Sight(bearings[order], scan.ranges[scan.valid][order])
+    spacing = float(np.median(np.diff(np.sort(wrap(scan.bearings))))) if len(scan) > 1 else 0.0
+    return Sight(bearings[order], scan.ranges[scan.valid][order], max(_APART, _BEAMS * spacing))
 
 
 @kernel
@@ -41,7 +51,7 @@ def agreement(reference: Sight, scan: Sight, pose: Array, margin: float) -> tupl
         u, v = rotate(c, s, x, y)
         u, v = pose[0] + u, pose[1] + v
         k = np.searchsorted(reference.bearings, np.arctan2(v, u))
-        if k == 0 or k > last or reference.bearings[k] - reference.bearings[k - 1] > _APART:
+        if k == 0 or k > last or reference.bearings[k] - reference.bearings[k - 1] > reference.apart:
             continue
         near, far = reference.ranges[k - 1], reference.ranges[k]
         if near > far:

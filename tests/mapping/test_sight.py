@@ -1,0 +1,36 @@
+"""What a scan saw of another one, however many beams the sensor has."""
+
+import numpy as np
+import pytest
+
+from lidarcore import Scan
+from lidarcore.geometry import relative
+from lidarcore.mapping.matching.sight import agreement, sight
+from lidarcore.simulation import World
+
+ROOM = World(np.array([[[0, 0], [6, 0]], [[6, 0], [6, 4]], [[6, 4], [0, 4]], [[0, 4], [0, 0]]], float))
+HERE, THERE = np.array([2.0, 1.5, 0.3]), np.array([2.3, 1.8, 0.4])
+
+
+def seen(pose: np.ndarray, beams: int, blind: slice = slice(0)) -> Scan:
+    bearings = np.linspace(-np.pi, np.pi, beams, endpoint=False)
+    ranges, _ = ROOM.cast(pose, bearings)
+    ranges[blind] = np.nan
+    return Scan(ranges, bearings)
+
+
+@pytest.mark.parametrize("beams", [24, 40, 60, 360])
+def test_two_scans_of_one_room_agree(beams: int) -> None:
+    lies_on, nearer = agreement(
+        sight(seen(HERE, beams)), sight(seen(THERE, beams)), relative(HERE, THERE), 0.1
+    )
+    assert lies_on > 0.9
+    assert nearer < 0.05
+
+
+@pytest.mark.parametrize("beams", [24, 60, 360])
+def test_what_no_beam_returned_from_counts_as_neither(beams: int) -> None:
+    half = slice(0, beams // 2)
+    lies_on, nearer = agreement(sight(seen(HERE, beams, half)), sight(seen(HERE, beams)), np.zeros(3), 0.1)
+    assert lies_on == pytest.approx(0.5, abs=0.06)
+    assert nearer == 0
