@@ -11,7 +11,7 @@ import pytest
 from mapping_scenes import BUILDING, NOISE, SETTINGS, drive, full_scan, way
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Ints
 from lidarcore.errors import MeasureError
 from lidarcore.geometry import act, compose, inverse
 from lidarcore.mapping import Mapper
@@ -32,9 +32,10 @@ def scans_of(world: World, poses: Array, seed: int = 1) -> list[Scan]:
     return [full_scan(world, pose, NOISE, rng) for pose in poses]
 
 
-def picture(scans: list[Scan], poses: Array) -> Walls:
+def picture(scans: list[Scan], poses: Array, nodes: Ints | None = None) -> Walls:
     covariances = np.tile(1e-8 * np.eye(3), (len(scans), 1, 1))
-    return find_walls(scans, poses, covariances, build_grid(scans, poses), extraction=EXTRACTION)
+    grid = build_grid(scans, poses)
+    return find_walls(scans, poses, covariances, grid, extraction=EXTRACTION, nodes=nodes)
 
 
 def across(n: int, y: float) -> Array:
@@ -141,6 +142,22 @@ def test_ids_stay_however_far_the_map_bends_and_whatever_was_found_first():
         x, y = act(np.array([1.0, 5.0, np.pi / 2]), np.array([at, 0.0] if axis == 0 else [0.0, at]))
         (new,) = along_line(after, 1 - axis, y if axis == 0 else x)
         assert new == old
+
+
+@pytest.mark.parametrize("dropped", [[0], [1, 3, 4], [0, 1, 2, 3, 4, 5, 7]])
+def test_ids_stay_where_the_map_drops_keyframes_and_bends(dropped: list[int]) -> None:
+    """Of many views of a place some are dropped: numbers of later keyframes stay, whatever place they have among all."""
+    poses = across(12, -1.0)
+    scans = scans_of(ROOM, poses)
+    ids = WallIds()
+    before = ids.identified(picture(scans[:8], poses[:8]))
+    nodes = np.delete(np.arange(12), dropped)
+    turn = np.array([1.0, 5.0, np.pi / 2])
+    after = ids.identified(picture([scans[node] for node in nodes], compose(turn, poses[nodes]), nodes))
+    assert len(before) == len(after) == 4
+    for axis, at in ((0, 4.0), (0, -4.0), (1, 2.0), (1, -2.0)):
+        x, y = act(turn, np.array([at, 0.0] if axis == 0 else [0.0, at]))
+        assert list(along_line(after, 1 - axis, y if axis == 0 else x)) == list(along_line(before, axis, at))
 
 
 def test_walls_that_become_one_keep_the_older_id_and_the_other_is_never_used_again():

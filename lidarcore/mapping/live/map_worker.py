@@ -131,9 +131,8 @@ class MapWorker(Background):
             self._drawn = poses[: node + 1]
 
     def _walls(self, grid: OccupancyGrid) -> Walls:
-        nodes, keyframes = list(self._back.keyframes), self._back.keyframes.values()
+        nodes, keyframes = np.array(list(self._back.keyframes)), self._back.keyframes.values()
         graph, scans = self._back.graph, [keyframe.scan for keyframe in keyframes]
-        found = find_walls(
-            scans, graph.poses[nodes], graph.covariances()[nodes], grid, extraction=self._extraction
-        )
+        poses, covariances = graph.poses[nodes], graph.covariances()[nodes]
+        found = find_walls(scans, poses, covariances, grid, extraction=self._extraction, nodes=nodes)
         return self._wall_ids.identified(found)

@@ -1,6 +1,7 @@
 """Observations of walls: by what stretches of segments a wall is told from all others, however the map is bent.
 
-A segment is found in the scan of one keyframe, so its number and where it begins do not change with any pose.
+A segment is found in the scan of one keyframe, so its number and where it begins do not change with any pose, nor where
+the map drops other keyframes.
 """
 
 from collections.abc import Sequence
@@ -13,13 +14,15 @@ from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.mapping.walls.parts import Part
 from lidarcore.mapping.walls.pieces import Pieces
 
+_MOST = 2**20  # segments of one keyframe
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Observations(Columns):
     """N stretches of segments, each seen of one wall.
 
     wall     (N,) which; a segment may have been seen of several, one beside the other
-    segment  (N,) number of the segment among those of all keyframes
+    segment  (N,) number of the segment: later keyframes have higher ones
     span     (N, 2) m along the segment, from its first end
     """
 
@@ -33,20 +36,29 @@ class Observations(Columns):
         return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2)))
 
     @classmethod
-    def of(cls, pieces: Pieces, parts: Sequence[Part]) -> "Observations":
-        """Observations of walls, by their place in the list: what of each of its segments lies between its ends."""
+    def of(cls, pieces: Pieces, parts: Sequence[Part], nodes: Ints) -> "Observations":
+        """Observations of walls, by their place in the list: what of each of its segments lies between its ends.
+
+        nodes (K,) are numbers of the keyframes, which stay theirs and rise.
+        """
         found = [cls.none()]
+        of_keyframe = np.arange(len(pieces)) - np.searchsorted(pieces.keyframe, pieces.keyframe)
+        numbers = nodes[pieces.keyframe] * _MOST + of_keyframe
         for i, part in enumerate(parts):
             t, _ = part.fit.coordinates(pieces.ends[part.members])
             first = t.min(axis=1, keepdims=True)
             span = np.clip([part.low, part.high], first, t.max(axis=1, keepdims=True)) - first
             on = span[:, 1] > span[:, 0]
-            found.append(cls(np.full(on.sum(), i), part.members[on], span[on]))
+            found.append(cls(np.full(on.sum(), i), numbers[part.members[on]], span[on]))
         return cls.joined(found)
 
     def renamed(self, names: Ints) -> "Observations":
         """These observations, with names[i] for wall i."""
         return Observations(names[self.wall], self.segment, self.span)
+
+    def by(self, nodes: Ints) -> "Observations":
+        """Those of these keyframes."""
+        return self[np.isin(self.segment // _MOST, nodes)]
 
     def lengths(self, walls: int) -> Array:
         """How much (W,) m of segments was seen of each of so many walls, each segment for itself."""

@@ -53,12 +53,14 @@ class Walls(WallTable):
     end_covariance  (W, 4, 4) of both ends, x and y; along the wall it means nothing where `ended` is false
     corners         where walls meet
     model           what the covariances come from, for what walls have in common
+    nodes           (K,) numbers of the keyframes that the map has
     observations    what of which segments each wall was seen by
     """
 
     end_covariance: Array
     corners: WallCorners
     model: WallModel = field(repr=False)
+    nodes: Ints = field(repr=False)
     observations: Observations = field(repr=False)
 
     def __repr__(self) -> str:
@@ -72,13 +74,16 @@ def find_walls(
     grid: OccupancyGrid,
     settings: WallSettings | None = None,
     extraction: ExtractionSettings | None = None,
+    nodes: Ints | None = None,
 ) -> Walls:
     """The walls that keyframes saw and the grid still has, with ids from 0 on.
 
     scans at poses (K, 3), T_world_sensor; spread says how the poses err together, or is their covariances (K, 3, 3).
+    nodes (K,) are the keyframes' numbers, rising, by which `WallIds` knows them again; by default from 0 on.
     """
     settings, extraction = settings or WallSettings(), extraction or ExtractionSettings()
     poses = np.asarray(poses, np.float64).reshape(-1, 3)
+    nodes = np.arange(len(scans)) if nodes is None else nodes
     pieces = collect_pieces(scans, poses, extraction)
     parts = find_parts(pieces, group_pieces(pieces, settings), grid, settings)
     ends = [(find_end(pieces, part, 0), find_end(pieces, part, 1)) for part in parts]
@@ -112,7 +117,8 @@ def find_walls(
         covariances[:, 2:, 2:],
         _corners(parts, intersections, model),
         model,
-        Observations.of(pieces, parts),
+        nodes,
+        Observations.of(pieces, parts, nodes),
     )
 
 
