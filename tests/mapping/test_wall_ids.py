@@ -146,7 +146,7 @@ def test_ids_stay_however_far_the_map_bends_and_whatever_was_found_first():
 
 @pytest.mark.parametrize("dropped", [[0], [1, 3, 4], [0, 1, 2, 3, 4, 5, 7]])
 def test_ids_stay_where_the_map_drops_keyframes_and_bends(dropped: list[int]) -> None:
-    """Of many views of a place some are dropped: numbers of later keyframes stay, whatever place they have among all."""
+    """Of many views of a place some are dropped: later keyframes keep their numbers."""
     poses = across(12, -1.0)
     scans = scans_of(ROOM, poses)
     ids = WallIds()

@@ -29,8 +29,7 @@ class WallIds:
     def identified(self, walls: Walls) -> Walls:
         """The walls of all keyframes so far, found with the same settings as those before, with their ids."""
         known, of = np.unique(self._known.wall, return_inverse=True)
-        seen = replace(self._known, wall=of).by(walls.nodes)
-        tied = _same(seen, walls.observations, (len(known), len(walls)))
+        tied = _same(replace(self._known, wall=of), walls.observations, (len(known), len(walls)))
         away = ~tied.any(axis=1)
         if self._last is not None:
             gone = np.isin(self._last.ids, known[away])

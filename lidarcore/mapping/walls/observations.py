@@ -56,10 +56,6 @@ class Observations(Columns):
         """These observations, with names[i] for wall i."""
         return Observations(names[self.wall], self.segment, self.span)
 
-    def by(self, nodes: Ints) -> "Observations":
-        """Those of these keyframes."""
-        return self[np.isin(self.segment // _MOST, nodes)]
-
     def lengths(self, walls: int) -> Array:
         """How much (W,) m of segments was seen of each of so many walls, each segment for itself."""
         return np.bincount(self.wall, np.diff(self.span)[:, 0], walls).astype(np.float64)

@@ -53,14 +53,12 @@ class Walls(WallTable):
     end_covariance  (W, 4, 4) of both ends, x and y; along the wall it means nothing where `ended` is false
     corners         where walls meet
     model           what the covariances come from, for what walls have in common
-    nodes           (K,) numbers of the keyframes that the map has
     observations    what of which segments each wall was seen by
     """
 
     end_covariance: Array
     corners: WallCorners
     model: WallModel = field(repr=False)
-    nodes: Ints = field(repr=False)
     observations: Observations = field(repr=False)
 
     def __repr__(self) -> str:
@@ -117,7 +115,6 @@ def find_walls(
         covariances[:, 2:, 2:],
         _corners(parts, intersections, model),
         model,
-        nodes,
         Observations.of(pieces, parts, nodes),
     )
 
