@@ -15,6 +15,7 @@ from lidarcore.arrays import Array, Ints
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LocalizationError
 from lidarcore.features import Features
+from lidarcore.geometry import wrap
 from lidarcore.localization.ekf.association import Association
 from lidarcore.localization.ekf.estimate import Innovation
 from lidarcore.localization.points import Points, widths
@@ -67,10 +68,16 @@ MOMENTS = 4  # an eighth of a revolution is the most that a point is away from i
 
 
 def corner_times(features: Features, beam_times: Array) -> Array:
-    """When each corner (K,) was seen, s after the stamp."""
+    """When each corner (K,) was seen, s after the stamp: where its walls meet, and so the beam that is nearest to it.
+
+    Across the seam of a revolution one of them was seen at its beginning and the other at its end.
+    """
     first, second = features.corners.segments.T
-    segments = features.segments
-    times: Array = (beam_times[segments.last_beam[first]] + beam_times[segments.first_beam[second]]) / 2
+    segments, corners = features.segments, features.corners.xy
+    beside = np.stack([segments.last_beam[first], segments.first_beam[second]], -1)
+    bearing = np.arctan2(corners[:, 1], corners[:, 0])[:, None]
+    nearer = np.argmin(np.abs(wrap(features.scan.bearings[beside] - bearing)), axis=1)
+    times: Array = beam_times[beside[np.arange(len(beside)), nearer]]
     return times
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from living_room import EXTRACTION, living_room, room_corners
 
-from lidarcore import extract
+from lidarcore import Scan, extract
 from lidarcore.geometry import wrap
 from lidarcore.localization import LocalizationSettings, Localizer, Points, deskew
 from lidarcore.localization.deskewing import skew
@@ -22,6 +22,19 @@ def test_every_point_is_in_one_moment(count: int) -> None:
     assert np.abs(moments - times).max(initial=0) <= 0.1 / 8 + 1e-12
     for parts in (in_moments(None, count), in_moments(moments, count)):
         assert sorted(np.concatenate([seen for _, seen in parts])) == list(range(count))
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.004, -0.004])
+def test_a_corner_across_the_seam_of_the_revolution_was_seen_at_its_beginning_or_end(turned: float) -> None:
+    bearings = np.linspace(0, 2 * np.pi, 720, endpoint=False)
+    towards = bearings + np.pi / 4 + turned
+    ranges = 3 / np.maximum(np.abs(np.cos(towards)), np.abs(np.sin(towards)))
+    scan = Scan(ranges, bearings, beam_times=bearings / 20)
+    assert scan.beam_times is not None
+    times = corner_times(found := extract(scan), scan.beam_times)
+    at = np.arctan2(found.corners.xy[:, 1], found.corners.xy[:, 0])
+    assert len(times) == 4
+    assert np.abs(wrap(20 * times - at)).max() < 0.02
 
 
 def test_skewing_undoes_deskewing() -> None:
