@@ -18,6 +18,8 @@ from lidarcore.localization import TrackingResult
 from lidarcore.mapping import MapPicture, WholeScans
 from lidarcore.mapping.grid import OccupancyGrid, build_grid
 from lidarcore.mapping.live import locate_worker
+from lidarcore.mapping.matching.front import FrontEnd
+from lidarcore.mapping.settings import MapperSettings
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings
@@ -200,6 +202,19 @@ def test_a_map_without_anything_in_it_says_so(drive: list[Scan], background: boo
             return
         tracker.step(drive[0])
         wait_until(lambda: "Nothing is occupied" in (tracker.step(drive[0]).message or ""))
+
+
+def test_in_a_map_without_anything_in_it_no_keyframe_is_left_waiting(drive: list[Scan]) -> None:
+    """What is not joined to the map would be gone through again at each scan, and there would be ever more of it."""
+    empty = MapPicture(OccupancyGrid(np.zeros((9, 9)), 0.05, np.zeros(3)))
+    settings = MapperSettings().with_noise(SETTINGS.noise)
+    front = FrontEnd(settings.front)
+    keyframes = [tracked for tracked in map(front.step, drive[:120]) if tracked.keyframe]
+    with closing(locate_worker.LocateWorker(empty, settings.drift_covariance, background=True)) as worker:
+        for tracked in keyframes:
+            worker.put(tracked)
+        wait_until(lambda: worker.corrected.keyframes == len(keyframes))
+    assert len(keyframes) > 3
 
 
 @pytest.mark.real_data

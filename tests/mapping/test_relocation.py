@@ -89,6 +89,21 @@ def test_poses_in_a_furnished_room_are_found_from_one_scan():
     assert (np.abs(errors) < 3 * np.array(claims)).mean() > 0.95
 
 
+def test_what_is_far_away_in_a_map_changes_nothing():
+    own, pose = furnished(), np.array([7.6, 4.4, 1.0])
+    around = np.full((own.cells.shape[0] + 2000, own.cells.shape[1] + 1400), -1, np.int8)
+    around[1000:-1000, 700:-700] = own.cells
+    around[[0, -1]] = 100
+    origin = compose(own.origin, np.array([-700, -1000, 0]) * own.resolution)
+    guess = UncertainPose(pose, np.diag([0.2, 0.2, 0.1]) ** 2)
+    query = query_of([scan_at(furnished_room(), pose)])
+    alone = Relocator(own).find_near(query, guess)
+    amid = Relocator(OccupancyGrid(around, own.resolution, origin)).find_near(query, guess)
+    assert alone.found
+    np.testing.assert_allclose(amid.pose, alone.pose, atol=1e-6)
+    np.testing.assert_allclose(amid.covariance, alone.covariance, rtol=1e-4)
+
+
 def test_maps_that_ros_placed_and_turned_are_searched_in_their_world(tmp_path):
     own = furnished()
     shift = np.array([12.0, -7.0, 0.6])

@@ -89,9 +89,11 @@ class LocateWorker(Background):
         else:
             self._go_on(item)
         if self._recent:
-            self._look(waiting)
-            self._poses[-1] = self._here.pose
-            self.corrected = Corrected(self._keyframes, np.array(self._poses), self._here.covariance)
+            try:
+                self._look(waiting)
+            finally:  # where nothing can be found, keyframes are done with, too
+                self._poses[-1] = self._here.pose
+                self.corrected = Corrected(self._keyframes, np.array(self._poses), self._here.covariance)
 
     def _go_on(self, tracked: Tracked) -> None:
         """Go on to the next keyframe, by the front end alone, or take the first one anew."""

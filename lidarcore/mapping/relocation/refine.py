@@ -16,9 +16,9 @@ def refined(field: Field, points: Array, pose: Array) -> tuple[Array, Array]:
 
     [Kohlbrecher et al. 2011], with the covariance of point positions of half a cell that are wrong together.
     """
-    level = field.levels[0].astype(np.float64) / FULL
-    dy, dx = np.gradient(level)
-    pose = pose.copy()
+    level, corner = _around(field, points, pose)
+    dy, dx = (np.asarray(np.gradient(level, axis=axis), np.float64) for axis in (0, 1))
+    pose = pose - corner
     for _ in range(_ROUNDS):
         fit, J = _linearised(level, dx, dy, points, pose)
         H = J.T @ J + 1e-6 * np.eye(3)
@@ -35,7 +35,16 @@ def refined(field: Field, points: Array, pose: Array) -> tuple[Array, Array]:
     N = J[used] / norm[used][:, None]  # the normals, and the levers that go with them
     information = N.T @ N / max(len(N), 1) / _FLOOR**2
     covariance = np.linalg.inv(information + 1e-6 * np.eye(3)).astype(np.float64)
-    return pose, covariance
+    return pose + corner, covariance
+
+
+def _around(field: Field, points: Array, pose: Array) -> tuple[Array, Array]:
+    """What of the fits points can meet on the way from a pose, and its corner (3,): column, row, and no angle."""
+    far = float(np.hypot(*points.T).max()) + _ROUNDS + 2
+    low = np.maximum(np.floor(pose[:2] - far), 0).astype(int)
+    high = np.ceil(pose[:2] + far).astype(int)
+    part = field.levels[0][low[1] : high[1], low[0] : high[0]]
+    return part.astype(np.float64) / FULL, np.array([*low, 0.0])
 
 
 def _linearised(level: Array, dx: Array, dy: Array, points: Array, pose: Array) -> tuple[Array, Array]:
