@@ -35,7 +35,13 @@ class MatchSettings:
     )
     cell: float = number(0.01, 0.5, "m", "grid in which the coarse match is sought", default=0.05)
     blur: float = number(0.01, 1, "m", "by which the coarse match blurs the reference", default=0.1)
-    horizon: float = number(1, 50, "m", "the coarse match leaves out what is farther away", default=12.0)
+    horizon: float = number(
+        1,
+        50,
+        "m",
+        "the coarse match leaves out what is farther away than this and than half of it",
+        default=12.0,
+    )
     max_shift: float = number(0, 30, "m", "the coarse match never looks farther than this", default=10.0)
     max_turn: float = number(0, 3.15, "rad", "the coarse match never turns by more than this", default=3.15)
 

@@ -6,7 +6,7 @@ from mapping_scenes import NOISE, full_scan, sick_scan
 from scipy.spatial import cKDTree
 
 from lidarcore import Scan
-from lidarcore.geometry import act, compose, pose_difference, relative, rotate
+from lidarcore.geometry import act, act_inverse, compose, pose_difference, relative, rotate
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.matching.correlative import search
 from lidarcore.mapping.matching.patches import joined, patches, placed
@@ -132,6 +132,16 @@ def test_a_search_looks_as_far_to_one_side_as_to_the_other(turn):
     sigma = np.array([*np.abs(rotate(turn, np.array([2.5, 0.1]))), 0.02])
     found = search(rotate(turn, seen) + 7 * ahead, rotate(turn, seen), np.zeros(3), sigma, MatchSettings())
     assert np.abs(found - [*(7 * ahead), 0.0]).max() < 0.1
+
+
+def test_in_a_hall_whose_walls_are_all_far_away_a_search_looks_at_them():
+    """50 by 40 m, with nothing within the horizon."""
+    along, across = np.linspace(-25, 25, 200), np.linspace(-20, 20, 160)
+    walls = [np.stack([along, np.full(200, y)], -1) for y in (-20, 20)]
+    walls += [np.stack([np.full(160, x), across], -1) for x in (-25, 25)]
+    hall, pose = np.concatenate(walls), np.array([2.0, -1.5, 0.2])
+    found = search(hall, act_inverse(pose, hall), np.zeros(3), np.array([1.5, 1.5, 0.15]), MatchSettings())
+    assert np.abs(pose_difference(found, pose)).max() < 0.15
 
 
 def _score(reference, points, pose, turn, guess, sigma, settings):

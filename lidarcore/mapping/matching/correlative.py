@@ -59,10 +59,14 @@ def search(
     """
     most = np.minimum(_REACH * sigma, [settings.max_shift, settings.max_shift, settings.max_turn])
     cell = settings.cell * (2 if most[:2].max() > _WIDE else 1)
-    near = points[np.hypot(*points.T) < settings.horizon]
+    if not len(points):
+        return guess
+    ranges = np.hypot(*points.T)
+    horizon = max(settings.horizon, float(np.median(ranges)))
+    near = points[ranges <= horizon]
     near = near[:: max(1, len(near) // _ENOUGH)]
-    kept = reference[np.hypot(*(reference - guess[:2]).T) < settings.horizon + most[:2].max()]
-    if not len(near) or not len(kept):
+    kept = reference[np.hypot(*(reference - guess[:2]).T) < horizon + most[:2].max()]
+    if not len(kept):
         return guess
     low, fine = _grid(kept, cell, max(settings.blur, cell))
     far = max(1.0, arm(near))
