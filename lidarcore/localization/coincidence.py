@@ -1,6 +1,7 @@
 """What of a scan lies on landmarks by chance: a pose found, and a single pair."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.stats import binom
 
 from lidarcore.arrays import Array, Ints
@@ -8,6 +9,9 @@ from lidarcore.geometry import act, chi_square_gate, rotation, squared_mahalanob
 from lidarcore.localization.points import Points
 
 _GATE = chi_square_gate(0.999)  # of what is called lying on a landmark
+_OWN = (
+    1.0  # m² that a landmark has to itself: a single one, or several in a row, are not dense beyond measure
+)
 _FIXED = 2  # points that a pose is made from lie on landmarks whatever it is
 
 
@@ -30,19 +34,21 @@ def _covered(seen: Array, observed: Points, landmarks: Points) -> Array:
     """Share (K,) of the landmarks' area in which a point with this covariance (K, 2, 2) lies on one of its kind."""
     gates = np.pi * _GATE * np.sqrt(np.linalg.det(seen[:, None] + landmarks.covariance))
     alike = np.asarray(observed.kinds)[:, None] == np.asarray(landmarks.kinds)
-    return np.minimum((gates * alike).sum(axis=1) / _area(landmarks), 1.0)
+    return np.minimum((gates * alike).sum(axis=1) / _area(landmarks.xy), 1.0)
 
 
-def _area(landmarks: Points) -> float:
-    """m² over which landmarks lie: an even spread over a rectangle of sides a and b has variances a²/12 and b²/12."""
-    spread = np.cov(landmarks.xy.T) if len(landmarks) > 1 else np.zeros((2, 2))
-    return float(12 * np.sqrt(np.linalg.det(spread + landmarks.covariance.mean(axis=0))))
+def _area(xy: Array) -> float:
+    """m² over which landmarks (L, 2) lie: an even spread over sides a and b has variances a²/12 and b²/12."""
+    spread = np.cov(xy.T) if len(xy) > 1 else np.zeros((2, 2))
+    return float(12 * np.sqrt(np.linalg.det(spread + _OWN / 12 * np.eye(2))))
 
 
-def densities(landmarks: Points) -> Array:
-    """How many landmarks of its kind there are for each landmark (L,), 1/m²."""
-    kinds, index, counts = np.unique(np.asarray(landmarks.kinds), return_inverse=True, return_counts=True)
-    per_area: Array = counts[index] / _area(landmarks) if len(kinds) else np.empty(0)
+def densities(xy: Array, kinds: ArrayLike, of: Ints) -> Array:
+    """How many of the landmarks (L, 2), (L,) there are of the kind of each of these (P,), 1/m²."""
+    every = np.asarray(kinds)
+    some, index = np.unique(every[of], return_inverse=True)
+    counts = np.array([np.count_nonzero(every == kind) for kind in some], np.float64)
+    per_area: Array = counts[index] / _area(xy)
     return per_area
 
 

@@ -10,7 +10,14 @@ from walks import POSTS, nees, sight, sighting, true_path
 from lidarcore import extract, open_recording
 from lidarcore.errors import LostError
 from lidarcore.geometry import relative
-from lidarcore.localization import Localizer, NavigationSettings, Navigator, Points
+from lidarcore.localization import (
+    LocalizationSettings,
+    Localizer,
+    NavigationSettings,
+    Navigator,
+    Points,
+    Slam,
+)
 from lidarcore.localization.relocation import relocalize
 
 
@@ -74,3 +81,22 @@ def test_in_a_poor_map_of_corners_it_never_tracks_elsewhere(data: Path) -> None:
             if now.state == "tracking"
         ]
         assert max(off, default=0.0) < 0.5
+
+
+def test_a_map_of_corners_takes_none_for_another_where_it_lost_sight_of_them() -> None:
+    """Four posts, then half a second in which it sees nothing and may have turned, then something else beside them."""
+    rng, slam = np.random.default_rng(4), Slam(LocalizationSettings(motion="constant velocity"))
+    posts = np.array([[2.0, 1.0], [2.0, -1.0], [-1.5, 1.2], [-1.0, -1.5]])
+    noise = 0.01**2 * np.eye(2)
+    for k in range(20):
+        slam.step(Points(posts + rng.normal(0, 0.01, posts.shape), noise), 0.1 * k)
+    assert slam.confirmed.all()
+    for k in range(20, 29):
+        slam.step(Points(np.empty((0, 2)), np.eye(2)), 0.1 * k)
+    before = slam.step(Points(np.empty((0, 2)), np.eye(2)), 2.9)
+    beside = slam.step(Points(posts[:1] + 0.9, noise), 3.0)
+    assert np.sqrt(before.covariance[0, 0]) > 0.3
+    assert beside.coasting
+    together = slam.step(Points(posts + rng.normal(0, 0.01, posts.shape), noise), 3.1)
+    assert len(together.association.landmark) == 4
+    assert np.hypot(*together.pose[:2]) < 0.05

@@ -38,7 +38,8 @@ class Localizer:
         covariance: ArrayLike,
         settings: LocalizationSettings | None = None,
     ) -> None:
-        self.landmarks, self._density = landmarks, densities(landmarks)
+        self.landmarks = landmarks
+        self._density = densities(landmarks.xy, landmarks.kinds, np.arange(len(landmarks)))
         self.settings = settings or LocalizationSettings()
         self._motion = motion_model(self.settings, with_velocity=False)
         self._last: Instant | None = None

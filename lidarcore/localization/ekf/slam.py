@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import act_inverse, chi_square_gate
 from lidarcore.geometry.kernels import compose_with_jacobians
+from lidarcore.localization.coincidence import densities, evidence
 from lidarcore.localization.ekf.association import Association, match
 from lidarcore.localization.ekf.estimate import Estimate, Innovation, Instant, as_pose
 from lidarcore.localization.ekf.joint import JointState
@@ -175,8 +176,18 @@ class Slam:
             noise = points.covariance[i]
             z, S = joint.jointly_expected(j, noise)
             innovation, kept = Innovation(association, points.xy[i] - z, S).compatible(self.settings.gate)
+            if self._is_chance(innovation):
+                return seen, innovation.doubted()
             joint.correct(innovation, noise[kept])
         return seen, innovation
+
+    def _is_chance(self, innovation: Innovation) -> bool:
+        """Whether what was matched may as well be new; where nothing is confirmed yet, all of it is what was seen."""
+        known, matched = self._register, innovation.association.landmark
+        if not known.confirmed[matched].any():
+            return False
+        density = densities(self._joint.landmarks, known.kinds, matched)
+        return evidence(innovation.value, innovation.covariance, density) < 0
 
     def _count(self, association: Association, observed: int, stamp: float, visible: Visible | None) -> None:
         """Count sightings and misses, and drop what is not there."""
