@@ -62,6 +62,18 @@ def _hold(inside: np.ndarray) -> None:
     assert inside.sum() >= binom.ppf(1e-3, n, 0.93)
 
 
+@pytest.mark.parametrize("beams", [90, 180, 360])
+def test_who_stands_has_the_walls_around_whole(beams):
+    """One scan whose beams are farther apart than the cells of the grid; each end is a beam short at most."""
+    room, poses = rectangular_room(8, 5), np.array([[0.4, 0.3, 0.2]])
+    whole = scans_of(room, poses)[0]
+    kept = np.arange(0, len(whole), len(whole) // beams)
+    scan = Scan(whole.ranges[kept], whole.bearings[kept])
+    walls = find_walls([scan], poses, np.zeros((1, 3, 3)), build_grid([scan], poses), extraction=SETTINGS)
+    assert len(walls) == 4
+    assert walls.length.sum() > 2 * (8 + 5) - 8 * 5 * 2 * np.pi / beams
+
+
 def test_four_walls_make_four_corners():
     walls = mapped(rectangular_room(6, 4), across())
     assert len(walls) == 4

@@ -41,11 +41,14 @@ def _covered(at: Array, t: Array) -> Mask:
 
 
 def _ask(grid: OccupancyGrid, fit: Fit, at: Array) -> tuple[Mask, Mask]:
-    """At points (A,) along a line: whether something stands within the band, and whether all of it is free."""
+    """At points (A,) along a line: whether something may stand within the band, and whether all of it is free.
+
+    Between the beams of one scan nothing is known of a wall's cells: seen on both sides, it stands there, too.
+    """
     line = fit.centre + at[:, None] * fit.along
     beside = np.arange(-_BAND, _BAND + 0.25, 0.5) * grid.resolution
     band = line[:, None] + beside[:, None] * fit.normal
     cells = grid.at(band.reshape(-1, 2)).reshape(len(at), -1)
-    stands: Mask = np.any(cells >= OCCUPIED_FROM, axis=1)
+    stands: Mask = np.any((cells >= OCCUPIED_FROM) | (cells < 0), axis=1)
     free: Mask = np.all((cells >= 0) & (cells <= FREE_UP_TO), axis=1)
     return stands, free
