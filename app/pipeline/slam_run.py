@@ -12,7 +12,7 @@ from lidarcore.localization import Landmarks, NavigationSettings, Navigator, Tra
 from lidarcore.mapping import MapPicture, WholeScans
 
 from ..sources.timed_scan import TimedScan
-from .trails import Paths, Trails
+from .trails import Paths, Trails, thinned
 
 REMEMBERED = 3000  # scans whose localization is shown again when they are
 
@@ -81,7 +81,7 @@ class Run:
         paths = self.trails.paths()
         if self.known is not None or not isinstance(self.navigator, WholeScans):
             return paths
-        return replace(paths, estimated=self.navigator.path())
+        return replace(paths, estimated=thinned(self.navigator.path()))
 
     def end(self) -> None:
         """Let what runs in the background end; returns at once."""
