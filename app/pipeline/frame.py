@@ -48,7 +48,6 @@ class Frame:
     paths: Paths = NO_PATHS
     picture: MapPicture | None = None
     cluster_us: float = 0.0
-    locate_us: float = 0.0
     draw_us: float = 0.0
     rate_hz: float = 0.0
     dropped: int = 0
@@ -58,6 +57,11 @@ class Frame:
     def main(self) -> Features:
         """The features by the main method."""
         return next(iter(self.features.values()))
+
+    @property
+    def locate_us(self) -> float | None:
+        """Time that the pose took; None if none was estimated, or it was known from before."""
+        return None if self.localization is None else self.localization.took_us
 
     @property
     def pose(self) -> Array:

@@ -74,6 +74,7 @@ class MapStore(Protocol):
 class LocalizationStatus:
     """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what.
 
+    A choice that was localized in ends when SLAM begins another map.
     `extent` is that of the grid that is localized in, if it is one: from and to along x, then along y, m.
     """
 
@@ -97,6 +98,7 @@ class Navigation:
         self.map_listeners: list[Callable[[], None]] = []
         self._store = store
         self._map: int | None = None
+        self._is_map_used = False  # since it was chosen
         self._run: Run | None = None
         self._placed: tuple[Array, ArrayLike] | None = None
         self._lock = threading.RLock()
@@ -115,7 +117,7 @@ class Navigation:
 
     @property
     def map(self) -> int | None:
-        """The session chosen to localize in; None for the newest."""
+        """The session chosen to localize in; None for the newest. SLAM ends a choice that was used before."""
         return self._map
 
     @property
@@ -151,7 +153,7 @@ class Navigation:
         if session is not None:
             self._store.is_built(session)
         with self._lock:
-            self._map = session
+            self._map, self._is_map_used = session, False
             if self._run and self._run.known is not None:
                 self._drop_run()
 
@@ -221,6 +223,8 @@ class Navigation:
             run.close()  # its map may be the one to localize in
         self._drop_run()
         self.problem = None
+        if wanted.mode == "slam" and self._is_map_used:
+            self._map, self._is_map_used = None, False  # what is built now is meant next
         replay = (timed.name, wanted) if timed.position.kind == "recording" else None
         if wanted.mode == "slam" and wanted.method == "scans":
             navigator = WholeScans(settings.extraction, lambda: self._begin_walls(timed.name, replay))
@@ -253,6 +257,7 @@ class Navigation:
     def _localizing(self, timed: TimedScan, settings: Settings) -> Run | None:
         self._store.settle()
         session = self._map if self._map is not None else self._store.newest()
+        self._is_map_used = True
         self._store.use(session)
         if session is None:
             self.problem = NO_MAP

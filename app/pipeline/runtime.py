@@ -32,6 +32,7 @@ logger = logging.getLogger(__name__)
 
 # scans, a minute of an S1: how long a corner that is hidden keeps its id while the sensor stands
 DORMANT = 600
+PAUSE = 2.0  # s without another scan, after which they have no rate
 END_WITHIN = 5.0  # s that the worker may take for the scan at hand
 
 
@@ -193,7 +194,6 @@ class Runtime:
         cluster_end = time.perf_counter()
         main = next(iter(features.values()))
         localization = self.navigation.step(timed, scan, main, clusters, settings.landmark_method)
-        locate_end = time.perf_counter()
         self._sequence += 1
         return Frame(
             sequence=self._sequence,
@@ -209,8 +209,7 @@ class Runtime:
             paths=self.navigation.paths,
             picture=self.navigation.picture,
             cluster_us=1e6 * (cluster_end - extract_end),
-            locate_us=1e6 * (locate_end - cluster_end),
-            rate_hz=self._rate(),
+            rate_hz=self._rate(timed),
             noise_remark=self._noise_check.observe(main, timed.source),
             dropped=self._newest.dropped,
         )
@@ -229,13 +228,14 @@ class Runtime:
             self._told = now
             self.announce()
 
-    def _rate(self) -> float:
-        """Frames per second over the last ones; 0 after a pause."""
+    def _rate(self, timed: TimedScan) -> float:
+        """Scans per second over the last ones; 0 after a pause. One that is shown again is not another one."""
         now = time.monotonic()
-        if self._times and now - self._times[-1] > 2:
+        if self._times and now - self._times[-1] > PAUSE:
             self._times.clear()
-        self._times.append(now)
-        span = now - self._times[0]
+        if self.frame is None or not timed.is_same(self.frame.timed):
+            self._times.append(now)
+        span = now - self._times[0] if self._times else 0.0
         return (len(self._times) - 1) / span if span else 0.0
 
 

@@ -1,5 +1,6 @@
 """One estimate from its beginning on: what the navigator said of each scan, and where that is kept."""
 
+import time
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from lidarcore.localization import Landmarks, NavigationSettings, Navigator, Tra
 from lidarcore.mapping import MapPicture, WholeScans
 
 from ..sources.timed_scan import TimedScan
-from .trails import Paths, Trails
+from .trails import Paths, Trails, thinned
 
 REMEMBERED = 3000  # scans whose localization is shown again when they are
 
@@ -22,6 +23,7 @@ class Localization:
 
     stored  ids in the file of landmarks by their ids in `tracking`; in a known map they are the same
     motion  what was taken out of the scan by deskewing: m/s ahead, rad/s, m/s to the left
+    took_us time to estimate the pose and to bring the map up to date; None where that was known from before
     """
 
     tracking: TrackingResult
@@ -29,6 +31,7 @@ class Localization:
     stored: Mapping[int, int]
     truth: Array | None
     motion: Velocity | None
+    took_us: float | None
 
 
 class MapRun(Protocol):
@@ -78,7 +81,7 @@ class Run:
         paths = self.trails.paths()
         if self.known is not None or not isinstance(self.navigator, WholeScans):
             return paths
-        return replace(paths, estimated=self.navigator.path())
+        return replace(paths, estimated=thinned(self.navigator.path()))
 
     def end(self) -> None:
         """Let what runs in the background end; returns at once."""
@@ -116,7 +119,8 @@ class Run:
     ) -> Localization:
         """Go on by a scan; one that was seen already is shown as it was then."""
         if (seen := self.recall(index)) is not None:
-            return seen
+            return replace(seen, took_us=None)
+        begin = time.perf_counter()
         found = self.navigator.step(scan, features, clusters)
         truth = self.trails.add(found, scan.truth)
         if self.written:
@@ -124,7 +128,9 @@ class Run:
         ids = found.landmarks.ids.tolist()
         stored = self.written.ids if self.written else dict(zip(ids, ids, strict=True))
         stamp, velocity = self.navigator.deskewed_by
-        result = Localization(found, self.session, stored, truth, velocity if stamp == scan.stamp else None)
+        motion = velocity if stamp == scan.stamp else None
+        took_us = 1e6 * (time.perf_counter() - begin)
+        result = Localization(found, self.session, stored, truth, motion, took_us)
         self.newest = max(self.newest, index)
         self.shown[index] = result
         if len(self.shown) > REMEMBERED:

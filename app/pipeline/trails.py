@@ -45,6 +45,11 @@ class Trail:
         self.points = np.vstack([self.points, xy])
 
 
+def thinned(points: Array) -> Array:
+    """At most MOST of points (N, 2) and the last one, as far apart everywhere: what is drawn is sent with each scan."""
+    return np.vstack([points[: -1 : 1 + len(points) // MOST], points[-1:]])
+
+
 @dataclass(frozen=True, slots=True)
 class Paths:
     """Trails (T, 2) m, world frame, of one moment; the arrays never change."""

@@ -155,5 +155,13 @@ def _read(path: Path, topic: str | None) -> Iterator["_Opened | dict[str, Any]"]
         if opened != told:
             yield opened
         told = opened
-        yield {field.name: getattr(scan, field.name) for field in fields(scan)}
+        yield _fields(scan)
     yield _Opened(recording.name, recording.topic, recording.topics, recording.notes, mask)
+
+
+def _fields(scan: Scan) -> dict[str, Any]:
+    """A scan by field. Corrected poses that a log has for odometry are not the truth, too: the estimate uses them."""
+    found = {field.name: getattr(scan, field.name) for field in fields(scan)}
+    if scan.truth is not None and scan.odometry is not None and np.array_equal(scan.truth, scan.odometry):
+        found["truth"] = None
+    return found

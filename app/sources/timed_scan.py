@@ -28,3 +28,7 @@ class TimedScan:
     source: int  # changes with every source opened
     seeks: int  # changes whenever someone goes to another scan of it
     arrival: float
+
+    def is_same(self, other: "TimedScan") -> bool:
+        """Whether it is the same scan, handed over again; how many there are may have changed since."""
+        return (self.source, self.position.index) == (other.source, other.position.index)

@@ -75,7 +75,7 @@ class Metrics(Collector):
     def _processed(self, frame: Frame) -> None:
         self._extraction.observe(1e-6 * frame.extract_us)
         self._drawing.observe(1e-6 * frame.draw_us)
-        if frame.localization:
+        if frame.locate_us is not None:
             self._location.observe(1e-6 * frame.locate_us)
 
     def _histogram(self, name: str, about: str, buckets: tuple[float, ...]) -> Histogram:

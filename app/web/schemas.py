@@ -159,11 +159,14 @@ class LocalizationJson(TypedDict):
 
 
 class TimingsJson(TypedDict):
-    """Work on this scan by its stages; `extract_us` of all methods together, `age_ms` since its last byte arrived."""
+    """Work on this scan by its stages; `extract_us` of all methods together, `age_ms` since its last byte arrived.
+
+    `locate_us` is null where no pose was estimated, or it was known from before, as in a recording that is repeated.
+    """
 
     extract_us: float
     cluster_us: float
-    locate_us: float
+    locate_us: float | None
     draw_us: float
     age_ms: float
 

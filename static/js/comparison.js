@@ -29,7 +29,7 @@ export function comparison(now) {
     reckoned && [
       "Odometry only",
       poseText(reckoned),
-      "The pose from odometry alone",
+      "The pose from odometry alone, or from the poses that a corrected log has in its place",
     ],
     truth && ["True pose", poseText({ x: truth[0], y: truth[1], heading: truth[2] }), "From the simulator or a reference system"],
     error && [

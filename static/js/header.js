@@ -1,11 +1,12 @@
 // The instrument's readouts: connection, source and the figures of the newest frame.
 
+import { isPlaying } from "./actions.js";
 import { $, el, setText } from "./dom.js";
 import { quantile } from "./history.js";
 import { isStale, nameOf, stateOf, stateText, troubleOf } from "./live.js";
 import { on } from "./store.js";
 import { showPanel } from "./tabs.js";
-import { COMPLETE_HINT, fixed, microseconds, milliseconds, percent, UNKNOWN } from "./units.js";
+import { COMPLETE_HINT, hertz, microseconds, milliseconds, percent, UNKNOWN } from "./units.js";
 
 const CONNECTION = { connecting: "Connecting", open: "Connected", lost: "Connection lost" };
 
@@ -16,7 +17,7 @@ const READOUTS = [
     label: "Rate",
     hint: "Scans a second",
     now: true,
-    text: (now) => `${fixed(rateOf(now), 1)}\u2009Hz`,
+    text: (now) => hertz(rateOf(now)),
   },
   { key: "corners", label: "Corners", text: ({ frame }) => frame.corners.length },
   { key: "segments", label: "Walls", text: ({ frame }) => frame.segments[frame.fitter]?.length ?? 0 },
@@ -120,8 +121,8 @@ function drawSource(source, connection) {
   document.title = `${nameOf(source)} · lidarcore`;
 }
 
-/** What comes from the sensor, or else what is shown. */
-const rateOf = ({ frame, source }) => source.device?.rate_hz ?? frame.rate_hz;
+/** What comes from the sensor, or else what is shown, as long as anything plays. */
+const rateOf = ({ frame, source }) => source.device?.rate_hz ?? (isPlaying(source) ? frame.rate_hz : NaN);
 
 function showBanner(connection, ready, source) {
   const text =

@@ -5,7 +5,7 @@ const LATELY = 300; // frames, half a minute
 
 const samples = [];
 
-/** Notes a frame's figures, its age and the time to localize only if it is `isNew`, not shown again; `now` in seconds. */
+/** Notes a frame's figures, its age only if it is `isNew`, not shown again; `now` in seconds. */
 export function remember(frame, isNew, now = performance.now() / 1000) {
   const { summary, localization, clusters, timings, source } = frame;
   samples.push({
@@ -15,7 +15,7 @@ export function remember(frame, isNew, now = performance.now() / 1000) {
     localization,
     extract: timings.extract_us,
     cluster: clusters ? timings.cluster_us : NaN,
-    locate: localization && isNew ? timings.locate_us : NaN, // else it was only looked up
+    locate: timings.locate_us ?? NaN,
     draw: timings.draw_us,
     age: isNew ? timings.age_ms * 1e3 : NaN,
   });

@@ -4,7 +4,6 @@ import { comparison } from "./comparison.js";
 import { $, el, remake, setText } from "./dom.js";
 import { isStale } from "./live.js";
 import { isSought } from "./pose.js";
-import { isPlaying } from "./actions.js";
 import { on } from "./store.js";
 import { DEGREE, degrees, fixed, metres, microseconds, spread, UNKNOWN, wholeNumber } from "./units.js";
 
@@ -77,8 +76,8 @@ const COUNTS = [
   {
     key: "locate",
     label: "Time per scan",
-    hint: "Time to estimate the pose and update the map",
-    read: (_, { locate_us }, source) => (isPlaying(source) ? locate_us : NaN),
+    hint: "Time to estimate the pose and update the map; none where the pose is known from before",
+    read: (_, { locate_us: took }) => took ?? NaN,
     text: microseconds,
   },
 ];
@@ -160,7 +159,7 @@ function draw(frame, { navigation }, source, connection, { problem }) {
     setText($(`pose-sigma-${key}`), hasPose(now) ? sigma(now) : "");
   }
   for (const { key, read, text = wholeNumber } of COUNTS)
-    setText($(`count-${key}`), now ? text(read(now, timings, source)) : UNKNOWN);
+    setText($(`count-${key}`), now ? text(read(now, timings)) : UNKNOWN);
   const lines = now ? comparison(now) : [];
   $("nis-about").hidden = !now?.dof;
   remake($("comparison"), lines, () =>

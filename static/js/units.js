@@ -50,6 +50,8 @@ export function microseconds(value) {
 /** A duration given in microseconds, in milliseconds. */
 export const milliseconds = (value) => (Number.isFinite(value) ? `${fixed(value / 1e3, 1)}\u2009ms` : UNKNOWN);
 
+export const hertz = (value) => (Number.isFinite(value) ? `${fixed(value, 1)}\u2009Hz` : UNKNOWN);
+
 /** A share of one; what is not whole is never shown as 100 %. */
 export function percent(share) {
   const shown = share < 1 ? Math.min(99.9, 100 * share) : 100;

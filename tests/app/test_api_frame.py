@@ -119,3 +119,31 @@ def test_timings_and_rate_are_measured(server: Server) -> None:
     assert timings["extract_us"] > 0
     assert timings["draw_us"] > 0
     assert timings["age_ms"] * 1e3 >= timings["extract_us"]
+
+
+def test_a_scan_that_is_shown_again_is_no_other_one(server: Server, room: Path) -> None:
+    server.play(room, paused=True)
+    with server.stream() as stream:
+        frames = [stream.frame()]
+        for ellipse_scale in range(3, 13):
+            server.change("PATCH", "/settings", {"view": {"ellipse_scale": ellipse_scale}})
+            frames.append(stream.frame(lambda f, last=frames[-1]: f["sequence"] > last["sequence"]))
+    rates = [frame["rate_hz"] for frame in frames]
+    assert rates == sorted(rates, reverse=True)
+
+
+def test_only_a_pose_that_is_estimated_takes_time(server: Server, room: Path) -> None:
+    server.play(room, paused=True)
+    assert server.get("/frame")["timings"]["locate_us"] is None
+    with server.stream() as stream:
+        stream.frame()
+        server.change("PATCH", "/settings", {"navigation": {"mode": "slam"}})
+        new = stream.frame(lambda f: f["localization"])
+        server.change("POST", "/source/step", {"by": 1})
+        newer = stream.frame(lambda f: f["source"]["index"] == 1)
+        server.change("POST", "/source/step", {"by": -1})
+        known = stream.frame(lambda f: f["source"]["index"] == 0)
+    assert new["timings"]["locate_us"] > 0
+    assert newer["timings"]["locate_us"] > 0
+    assert known["localization"]
+    assert known["timings"]["locate_us"] is None

@@ -233,6 +233,24 @@ def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(drivi
     located(driving, lambda where: where["mode"] == "slam")
 
 
+def test_what_slam_builds_takes_the_place_of_a_map_that_was_localized_in_before(driving: Server) -> None:
+    first = located(driving, lambda where: where["session"] is not None)["localization"]["session"]
+    driving.change("PUT", "/localization/map", {"session": first})
+    driving.change("POST", "/localization/reset", None)  # not used yet: it stays chosen
+    located(driving, lambda where: where["session"] not in (None, first))
+    assert driving.get("/localization")["map"] == first
+    driving.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
+    assert located(driving, lambda where: where["mode"] == "localize")["localization"]["session"] == first
+    driving.change("PATCH", "/settings", SLAM)
+    built = located(driving, lambda where: where["mode"] == "slam" and where["session"] not in (None, first))
+    assert driving.get("/localization")["map"] is None
+    driving.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
+    localized = located(driving, lambda where: where["mode"] == "localize")
+    assert localized["localization"]["session"] == built["localization"]["session"]
+    driving.change("PATCH", "/settings", SLAM)
+    located(driving, lambda where: where["mode"] == "slam")
+
+
 @pytest.mark.long
 def test_a_recording_that_is_opened_again_leaves_one_map_beside_the_one_that_is_built(
     server: Server, room: Path
@@ -279,3 +297,14 @@ def test_between_two_runs_a_pose_can_be_set(driving: Server) -> None:
     driving.change("POST", "/localization/reset", None)
     driving.change("POST", "/pose", {"x": 700.0, "y": 0.0, "heading": 0.0})
     located(driving, lambda where: abs(where["pose"]["x"] - 700) < 50)
+
+
+def test_the_corrected_poses_of_a_log_are_its_odometry_and_no_truth_to_judge_by(
+    server: Server, folder: Path, data: Path
+) -> None:
+    log = folder / "intel-corrected.log.gz"
+    log.write_bytes((data / "carmen_radish_corrected" / log.name).read_bytes())
+    server.change("PATCH", "/settings", SLAM)
+    where = server.play(log, paused=True)["localization"]
+    assert where["dead_reckoned"]
+    assert where["truth"] is None

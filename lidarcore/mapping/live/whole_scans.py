@@ -96,7 +96,7 @@ class WholeScans:
         known = self._background.corrected
         newer = [pose.pose[:2] for pose in self._chain(known)[1:]]
         here = [] if self._here is None else [self._here.pose[:2]]
-        return np.array([*known.poses[:, :2], *newer, *here])
+        return np.vstack([known.poses[:, :2], *newer, *here])
 
     def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         """Say by hand where the sensor is in a known map: T_map_sensor (3,) m, m, rad and its covariance (3, 3).
