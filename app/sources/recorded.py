@@ -155,13 +155,8 @@ def _read(path: Path, topic: str | None) -> Iterator["_Opened | dict[str, Any]"]
         if opened != told:
             yield opened
         told = opened
-        yield _fields(scan)
+        found = {field.name: getattr(scan, field.name) for field in fields(scan)}
+        if recording.is_corrected:  # the estimate is made of these poses: nothing to judge it by
+            found["truth"] = None
+        yield found
     yield _Opened(recording.name, recording.topic, recording.topics, recording.notes, mask)
-
-
-def _fields(scan: Scan) -> dict[str, Any]:
-    """A scan by field. Corrected poses that a log has for odometry are not the truth, too: the estimate uses them."""
-    found = {field.name: getattr(scan, field.name) for field in fields(scan)}
-    if scan.truth is not None and scan.odometry is not None and np.array_equal(scan.truth, scan.odometry):
-        found["truth"] = None
-    return found

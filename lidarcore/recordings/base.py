@@ -35,6 +35,7 @@ class Recording(ABC):
     mask            sectors of the robot's own body, left out of every scan; those kept in the file, else ()
     stations        numbers of the scans from which on the sensor stood at another place, as far as the file says so
                     and the iteration has come; () if it says nothing
+    is_corrected    whether the odometry of scans is poses that someone has corrected, which are their truth, too
 
     Iterating raises RecordingError if the file holds no scan or turns out hostile. What can be saved of a
     damaged or truncated file is yielded, and `notes` say so. Iterate in one place at a time: an iteration
@@ -54,6 +55,7 @@ class Recording(ABC):
         self.topic: str | None = None
         self.T_base_sensor: Array | None = None
         self.mask: tuple[Sector, ...] = ()
+        self.is_corrected = False
         self._stations: list[int] = []
         self._remarks: dict[str, None] = {}
         self._counts: Counter[str] = Counter()

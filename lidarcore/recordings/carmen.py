@@ -38,7 +38,6 @@ class CarmenLog(LaserLog):
         self._parameters: dict[str, str] = {}
         self._wheel_poses = array("d")
         self._track: PoseTrack | None = None
-        self._corrected = False
         super()._open(topic)
 
     def _distinct(self, topics: set[str]) -> set[str]:
@@ -72,7 +71,7 @@ class CarmenLog(LaserLog):
 
     def _scan(self, reading: Reading, stamp: float) -> Scan:
         scan = super()._scan(reading, stamp)
-        return replace(scan, truth=scan.odometry) if self._corrected else scan
+        return replace(scan, truth=scan.odometry) if self.is_corrected else scan
 
     def _parse(self, words: list[bytes]) -> Reading | None:
         kind = words[0].decode("ascii", "replace") if words else ""
@@ -85,7 +84,7 @@ class CarmenLog(LaserLog):
         elif kind == "PARAM" and words[1].decode(errors="replace") in (_FRONT[0], _REAR[0]):
             self._parameters[words[1].decode(errors="replace")] = words[2].decode(errors="replace")
         elif kind == "NEFF":
-            self._corrected = True
+            self.is_corrected = True
             self._remark("GMapping wrote the log (NEFF lines): its poses are corrected, not wheel odometry.")
         return None
 
