@@ -1,6 +1,7 @@
 """What the scene shows of the map and of the sensor's way through it."""
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from ..pipeline.slam_run import Localization
 from ..pipeline.trails import Paths
 from .canvas import Canvas
 from .colours import Rgbs
+from .painter import Painter
 from .shapes import polylines
 
 NOTHING = np.empty((0, 2, 2))
@@ -23,8 +25,12 @@ class MapLayers:
     """Trails, building and associations, in the world frame; `colour` gives that of a name."""
 
     def __init__(self, canvas: Canvas, colour: Callable[[str], Rgbs]) -> None:
-        self._canvas, self._colour = canvas, colour
+        self._canvas, self._colour, self._painter = canvas, colour, Painter()
         self._looks: dict[str, tuple[object, ...]] = {}
+
+    def close(self) -> None:
+        """Paint no more."""
+        self._painter.close()
 
     def draw(self, frame: Frame) -> None:
         """Show where the sensor has been and what it has built; without an estimate there is nothing to show."""
@@ -49,14 +55,15 @@ class MapLayers:
             walls = NOTHING if picture is None or picture.walls is None else picture.walls.ends
             self._canvas.strokes("walls", layers.walls, walls, self._colour("wall"))
             if picture is None or not layers.occupancy:
-                self._canvas.visible("occupancy", False)
+                self._painter.paint(partial(self._canvas.visible, "occupancy", False))
             else:
-                self._show_grid(picture.grid)
+                free, occupied = self._colour("free"), self._colour("occupied")
+                self._painter.paint(partial(self._show_grid, picture.grid, free, occupied))
 
-    def _show_grid(self, grid: OccupancyGrid) -> None:
+    def _show_grid(self, grid: OccupancyGrid, free: Rgbs, occupied: Rgbs) -> None:
         pixels = np.zeros((*grid.cells.shape, 4), np.uint8)  # what is unknown is transparent
-        pixels[grid.free] = (*self._colour("free"), 255)
-        pixels[grid.occupied] = (*self._colour("occupied"), 255)
+        pixels[grid.free] = (*free, 255)
+        pixels[grid.occupied] = (*occupied, 255)
         size = np.array(grid.cells.shape[::-1]) * grid.resolution
         middle = compose(grid.origin, np.array([*(size / 2), 0.0]))
         self._canvas.picture("occupancy", pixels, (float(size[0]), float(size[1])), middle)

@@ -42,6 +42,10 @@ class Scene:
             self._map.draw(frame)
         self._server.flush()
 
+    def close(self) -> None:
+        """Draw no more."""
+        self._map.close()
+
     def _colour(self, name: str) -> Rgbs:
         return theme_colour(self._theme, name)
 

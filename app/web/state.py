@@ -72,8 +72,8 @@ class State:
         self.landmarks = _landmark_store(options, self._ending)
         folder = options.recordings.parent
         setups = SensorSetups(SensorMemory(folder / SENSORS))
-        scene = Scene(self.viser.server)
-        self.runtime = Runtime(first, options.settings, Navigation(self.landmarks), scene.draw, setups)
+        self._scene = Scene(self.viser.server)
+        self.runtime = Runtime(first, options.settings, Navigation(self.landmarks), self._scene.draw, setups)
         self.metrics = Metrics()
         self.hub = Hub(self.runtime, self.recorder, self.landmarks, self.metrics.sent)
         self.metrics.observe(self.runtime, self.hub, self.recorder)
@@ -97,7 +97,7 @@ class State:
     def close(self) -> None:
         """End everything, what produces before what is told of it."""
         self.hub.close()
-        for part in (self.runtime, self.studies, self.calibration):
+        for part in (self.runtime, self._scene, self.studies, self.calibration):
             part.close()
         self.recorder.stop()
         self.library.trash.empty()
