@@ -11,6 +11,7 @@ from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
 from lidarcore.mapping.matching.odometry_calibration import OdometryCalibration
 from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.persistence import Persistence
+from lidarcore.mapping.matching.registration import Registration
 from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, elapsed, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.tracked import Tracked
@@ -51,14 +52,7 @@ class FrontEnd:
         is believed: clock and odometry go on from there, and what the scan sees tells how the sensor moved meanwhile.
         """
         if self._before is None:
-            seen = patches(scan, self._settings.match)
-            self._before = scan.stamp, scan.odometry
-            self._begin(seen)
-            given = np.zeros(3) if removed is None else removed
-            self._first = Tracked(
-                scan.stamp, 0, _HERE, _HERE, None, True, scan, seen, NOTHING, given, True, False
-            )
-            return self._first
+            return self._begun(scan, removed)
         dt, driven = self._across(scan)
         first, self._first = self._first, None
         if first is not None:
@@ -67,28 +61,11 @@ class FrontEnd:
             dt, driven = self._since(scan)
         guess, moved = self._known.compose(driven), self._moved.compose(self._farther(driven, scan))
         wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
-        scan = self._sweep.remove(scan, wheels, removed)
-        seen = patches(scan, self._settings.match)
-        registered = self._map.registered(seen, guess)
-        if registered.inliers >= SURE and dt > 0:
-            found = relative(self._known.pose, self._map.tie(registered).pose) / dt
-            corrected = self._sweep.correct(scan, found, dt)
-            if corrected is not scan:
-                scan, seen = corrected, patches(corrected, self._settings.match)
-                registered = self._map.registered_again(seen, guess, registered.pose)
-        rival = self._map.rival(seen, guess, registered)
-        fits = registered.inliers >= self._settings.inliers and not self._map.is_chance(
-            seen, guess, registered
-        )
-        on = fits and rival is None
-        matched = self._map.tie(registered) if on else guess
-        tie = UncertainPose(matched.pose, matched.covariance + self._sweep.covariance)
-        if rival is not None:
-            tie = self._map.either(registered, rival)
+        scan, seen, registered = self._registered(self._sweep.remove(scan, wheels, removed), guess, dt)
+        matched, tie, on = self._judged(seen, guess, registered)
         is_blind = len(seen.near.means) < BLIND
         island = not is_blind and not on and bool(tie.covariance[2, 2] > VAGUE**2)
         self._go_on(scan, guess, matched, dt, on)
-        self._period += _SLOW * (dt - self._period)
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
         tie = UncertainPose(tie.pose, tie.covariance + self._motion.astray)
         leaves = island or (not is_blind and self._leaves(tie[0], registered.inliers))
@@ -104,6 +81,41 @@ class FrontEnd:
                 self._map.clear()
             self._begin(seen, tie.pose)
         return tracked
+
+    def _begun(self, scan: Scan, removed: Array | None) -> Tracked:
+        """The first scan, where the map begins."""
+        seen = patches(scan, self._settings.match)
+        self._before = scan.stamp, scan.odometry
+        self._begin(seen)
+        given = np.zeros(3) if removed is None else removed
+        self._first = Tracked(
+            scan.stamp, 0, _HERE, _HERE, None, True, scan, seen, NOTHING, given, True, False
+        )
+        return self._first
+
+    def _registered(self, scan: Scan, guess: UncertainPose, dt: float) -> tuple[Scan, Patches, Registration]:
+        """The scan on the local map, once more without the motion that it shows there."""
+        seen = patches(scan, self._settings.match)
+        registered = self._map.registered(seen, guess)
+        if registered.inliers >= SURE and dt > 0:
+            found = relative(self._known.pose, self._map.tie(registered).pose) / dt
+            corrected = self._sweep.correct(scan, found, dt)
+            if corrected is not scan:
+                scan, seen = corrected, patches(corrected, self._settings.match)
+                registered = self._map.registered_again(seen, guess, registered.pose)
+        return scan, seen, registered
+
+    def _judged(
+        self, seen: Patches, guess: UncertainPose, registered: Registration
+    ) -> tuple[UncertainPose, UncertainPose, bool]:
+        """Where it was matched, or guessed; the same as uncertain as it stands; and whether it lies on the map."""
+        rival = self._map.rival(seen, guess, registered)
+        is_chance = self._map.is_chance(seen, guess, registered)
+        on = registered.inliers >= self._settings.inliers and not is_chance and rival is None
+        matched = self._map.tie(registered) if on else guess
+        if rival is not None:
+            return matched, self._map.either(registered, rival), on
+        return matched, UncertainPose(matched.pose, matched.covariance + self._sweep.covariance), on
 
     @property
     def wheels(self) -> Array:
@@ -200,6 +212,7 @@ class FrontEnd:
         self._motion.find(self._known, guess, found, min(dt, 1.0) * self._change(dt))
         if not on:
             self._motion.stop()
+        self._period += _SLOW * (dt - self._period)
 
     def _change(self, dt: float) -> Array:
         """(3, 3) of a step, by how much speeds may differ from those of the step before it."""
