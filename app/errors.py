@@ -45,16 +45,28 @@ class InvalidValues(Protocol):
 
 _PLACES = ("body", "query", "path")  # of a request: what the value is called says enough
 _NO_BODY = ("missing", "dict_type", "model_attributes_type")
+NO_BODY = "Send a JSON body, with the header Content-Type: application/json."
 
 
 def invalid_values(error: InvalidValues) -> list[tuple[list[str], str]]:
     """Every value that is not valid: the names that lead to it, and what is wrong with it."""
-    return [([str(part) for part in e["loc"] if part not in _PLACES], _wrong(e)) for e in error.errors()]
+    return [(_path(e), _wrong(e)) for e in error.errors()]
+
+
+def _path(error: Any) -> list[str]:
+    return [] if _is_no_json(error) else [str(part) for part in error["loc"] if part not in _PLACES]
+
+
+def _is_no_json(error: Any) -> bool:
+    """Whether a body cannot be read as JSON: it names no value then, but where reading failed."""
+    return bool(error["type"] == "json_invalid" and error["loc"][:1] == ("body",))
 
 
 def _wrong(error: Any) -> str:
+    if _is_no_json(error):
+        return f"The body is not valid JSON: {error['ctx']['error']} (character {error['loc'][1] + 1})."
     if error["loc"] == ("body",) and error["type"] in _NO_BODY:
-        return "Send a JSON body, with the header Content-Type: application/json."
+        return NO_BODY
     return str(error["msg"]).removeprefix("Value error, ")
 
 

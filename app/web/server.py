@@ -4,7 +4,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
-from fastapi import APIRouter, FastAPI
+from fastapi import APIRouter, Depends, FastAPI
 from fastapi.staticfiles import StaticFiles
 from starlette.responses import FileResponse, HTMLResponse, Response
 from starlette.types import Receive, Scope, Send
@@ -12,6 +12,7 @@ from starlette.types import Receive, Scope, Send
 from ..scene.palette import stylesheet
 from . import openapi, problems
 from .metrics import metrics_router
+from .queries import check_query
 from .routes import (
     calibration,
     frame,
@@ -90,7 +91,7 @@ def create_app(options: ServerOptions) -> FastAPI:
     app.state.server = state
     problems.install(app)
     openapi.document(app)
-    api = APIRouter(prefix=API)
+    api = APIRouter(prefix=API, dependencies=[Depends(check_query)])
     for module in ROUTES:
         api.include_router(module.router)
     app.include_router(api)

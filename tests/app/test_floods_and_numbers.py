@@ -55,6 +55,49 @@ def test_more_odometry_than_a_robot_sends_is_dropped_and_counted(monkeypatch) ->
     assert sum(feed.put(10 + i * 1e-3, (0.0, 0.0, 0.0), limits) for i in range(second)) == second // 2
 
 
+@pytest.mark.parametrize(
+    ("method", "path", "said"),
+    [
+        ("GET", "/map?formt=png", "There is no such parameter; there is format, resolution, session."),
+        ("GET", "/landmarks/nearest?x=0&y=0&n=3", "k, kind, max_sigma, method"),
+        ("POST", "/map?session=1", "there is format, name."),
+        ("GET", "/pose?since=3", "there is none."),
+    ],
+)
+def test_parameters_that_would_do_nothing_are_refused(
+    shared_server: Server, method: str, path: str, said: str
+) -> None:
+    problem = assert_problem(shared_server.http.request(method, path), 422)
+    assert said in problem["detail"]
+    assert len(problem["errors"]) == 1
+
+
+@pytest.mark.parametrize("format", ["json", "csv", "geojson", "svg", "dxf"])
+def test_a_resolution_is_that_of_a_picture(shared_server: Server, format: str) -> None:
+    answer = shared_server.http.get("/map", params={"format": format, "resolution": 0.1})
+    assert f"leave it out for {format}." in assert_problem(answer, 422)["detail"]
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [("{nope", "Expecting property name enclosed in double quotes (character 2)."), ("[1, ]", "(character")],
+)
+@pytest.mark.parametrize(("method", "path"), [("PATCH", "/settings"), ("POST", "/odometry")])
+def test_a_body_that_is_no_json_is_called_so(
+    shared_server: Server, method: str, path: str, body: str, said: str
+) -> None:
+    declared = {"Content-Type": "application/json"}
+    problem = assert_problem(shared_server.http.request(method, path, content=body, headers=declared), 422)
+    assert problem["detail"].startswith("The body is not valid JSON: ")
+    assert said in problem["detail"]
+    assert [error["pointer"] for error in problem["errors"]] == ["/"]
+
+
+def test_odometry_that_is_not_declared_as_json_is_asked_for_as_such(shared_server: Server) -> None:
+    answer = shared_server.http.post("/odometry", content='{"stamp": 0, "x": 0, "y": 0, "heading": 0}')
+    assert assert_problem(answer, 422)["detail"].startswith("Send a JSON body")
+
+
 def test_allow_names_every_method_of_the_path(shared_server: Server) -> None:
     answer = shared_server.http.delete("/source")
     assert_problem(answer, 405)

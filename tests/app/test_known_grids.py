@@ -10,12 +10,13 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import httpx
 import numpy as np
 import pytest
+from PIL import Image
 from processes import Serving, assert_refused, run
 from serving import Server, assert_problem, wait_until
 
 from lidarcore import Scan
 from lidarcore.geometry import compose
-from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, write_ros_map
+from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, shades_of, write_ros_map
 from lidarcore.recordings.writer import RecordingWriter
 from lidarcore.scan import Array
 from lidarcore.simulation.robot import SimulatedRobot
@@ -141,6 +142,22 @@ def test_a_body_is_of_the_format_that_it_is_declared_to_have(
 def test_bytes_that_are_no_zip_are_refused(shared_server: Server) -> None:
     answer = shared_server.http.post("/map", params={"format": "zip"}, content=b"not a zip")
     assert "zip cannot be read" in assert_problem(answer, 422)["detail"]
+
+
+def test_a_grid_is_no_file_of_landmarks_and_has_a_resolution_of_its_own(
+    shared_server: Server, ros_map: Path, grid: OccupancyGrid
+) -> None:
+    body = packed(("hall.yaml", ros_map.read_bytes()), ("hall.pgm", ros_map.with_suffix(".pgm").read_bytes()))
+    session = shared_server.http.post("/map", params={"format": "zip"}, content=body).json()["id"]
+    for format in ("json", "csv", "geojson"):
+        answer = shared_server.http.get("/map", params={"session": session, "format": format})
+        assert "a grid, in the formats png and zip." in assert_problem(answer, 404)["detail"]
+    picture = {"session": session, "format": "png"}
+    shades = np.asarray(Image.open(io.BytesIO(shared_server.http.get("/map", params=picture).content)))
+    np.testing.assert_array_equal(shades, shades_of(grid))
+    for format in ("png", "zip"):
+        answer = shared_server.http.get("/map", params=picture | {"format": format, "resolution": 0.2})
+        assert "of 0.05 m: leave out resolution" in assert_problem(answer, 422)["detail"]
 
 
 @pytest.mark.long

@@ -146,6 +146,8 @@ def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
     rest = server.get("/walls/4/history", limit=3, after=told["next"], **kept)
     assert [wall["last_seen"] for wall in rest["history"]] == [103.0, 104.0]
     assert rest["next"] is None
+    where = assert_problem(server.http.get("/map", params=kept), 404)["detail"]
+    assert f"walls, in the formats svg and dxf and at /walls?session={run.session}." in where
     run.put(GRID, walls(stored(7)))
     wait_until(lambda: store.status.behind_s == 0)
     gone = server.get("/walls/4/history", **kept)

@@ -9,14 +9,14 @@ from pydantic import Field, TypeAdapter, WithJsonSchema
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
-from ...errors import NotFoundError
+from ...errors import NO_BODY, NotFoundError
 from ...pipeline.navigation import SIGMA_HEADING, SIGMA_POSITION, LocalizationStatus, Navigation
 from ...pipeline.runtime import Runtime
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
 from ...records import record
 from ..openapi import formats
-from ..problems import documented, encode
+from ..problems import ProblemError, documented, encode
 from ..schemas import Body as Model
 from ..schemas import Coordinate, Matrix3, Number, OdometryPose, Row3
 from ..serializers import pose_json
@@ -154,7 +154,9 @@ def odometry(
 
 
 def _poses(body: Any) -> list[OdometryPose]:
-    """One pose or several; a union of both would complain about both. Raises pydantic.ValidationError."""
+    """One pose or several; a union of both would complain about both. Raises ProblemError or ValidationError."""
+    if isinstance(body, bytes):  # FastAPI hands over what is not declared to be JSON as it came
+        raise ProblemError(422, NO_BODY)
     if isinstance(body, list):
         return TypeAdapter(list[OdometryPose]).validate_python(body)
     return [OdometryPose.model_validate(body)]

@@ -14,9 +14,9 @@ from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import FileResponse
 
-from lidarcore.landmarks import Session, export_map, export_picture
+from lidarcore.landmarks import LandmarkMap, Session, export_map, export_picture
 from lidarcore.mapping.export import plan_dxf, plan_svg
-from lidarcore.mapping.grid import shades_of, write_ros_map
+from lidarcore.mapping.grid import OccupancyGrid, shades_of, write_ros_map
 from lidarcore.mapping.walls import WallTable
 
 from ...errors import NotFoundError
@@ -27,6 +27,7 @@ from .dependencies import Server
 from .landmarks import SessionId, chosen_map
 
 MAX_BYTES = 32 << 20  # of a map that is loaded, some 150,000 landmarks
+RESOLUTION = 0.05  # m a pixel of a picture of landmarks, if nobody says another one
 MOST_PIXELS = 16_000_000  # of a picture: 200 m by 200 m at 5 cm, and 32 MB while it is packed
 PICTURES = ("png", "zip")
 PLANS = {"svg": plan_svg, "dxf": plan_dxf}
@@ -68,13 +69,22 @@ async def download(
             "svg, dxf: the floor plan of its walls, in m"
         ),
     ] = "json",
-    resolution: Annotated[float, Query(ge=1e-3, le=1e3, description="m a pixel, of a picture")] = 0.05,
+    resolution: Annotated[
+        float | None,
+        Query(
+            ge=1e-3,
+            le=1e3,
+            description=f"m a pixel, of a picture of landmarks; {RESOLUTION} if not given. A grid has its own",
+        ),
+    ] = None,
 ) -> FileResponse:
     """All landmarks of a session, in metres in its world frame. Made for one request at a time: others wait.
 
-    If it has an occupancy grid, the picture is of that, in its own resolution. 404 if there are no walls to draw a
-    floor plan of.
+    If it has an occupancy grid, the picture is of that. 404 if there are no walls to draw a floor plan of, or a map of
+    whole scans has no landmarks; 422 if a resolution is given for anything but a picture of landmarks.
     """
+    if resolution is not None and format not in PICTURES:
+        raise ProblemError(422, f"resolution is that of a picture, png or zip: leave it out for {format}.")
     make = partial(_file, server.landmarks, session, format, resolution)
     return await anyio.to_thread.run_sync(make, limiter=server.heavy)
 
@@ -123,31 +133,60 @@ def _format_of(request: Request) -> str:
     return next((name for name, type_ in MEDIA_TYPES.items() if type_ == declared and type_ in FILES), "json")
 
 
-def _file(landmarks: LandmarkStore, session: int | None, format: str, resolution: float) -> FileResponse:
+def _file(
+    landmarks: LandmarkStore, session: int | None, format: str, resolution: float | None
+) -> FileResponse:
     landmark_map = chosen_map(landmarks, session)
     folder = tempfile.TemporaryDirectory(prefix="lidarcore-map-")
     try:
         path = Path(folder.name) / f"map.{format}"
-        grid = landmarks.grid(landmark_map.session) if format in PICTURES else None
-        if format in PLANS:
-            path.write_text(
-                _plan(landmarks.walls(landmark_map.session), landmark_map.session, format), "utf-8"
-            )
-        elif grid is not None and format == "zip":
-            write_ros_map(grid, path.with_suffix(".yaml"))
-        elif grid is not None:
-            Image.fromarray(shades_of(grid)).save(path)
-        elif format in PICTURES:
-            export_picture(landmark_map, path.with_suffix(".png"), resolution, MOST_PIXELS)
-        else:
-            export_map(landmark_map, path)
-        if format == "zip":
-            _pack(path)
+        _write(landmarks, landmark_map, path, resolution)
     except BaseException:
         folder.cleanup()
         raise
     name, cleanup = f"map-{landmark_map.session}.{format}", BackgroundTask(folder.cleanup)
     return FileResponse(path, media_type=MEDIA_TYPES[format], filename=name, background=cleanup)
+
+
+def _write(landmarks: LandmarkStore, landmark_map: LandmarkMap, path: Path, resolution: float | None) -> None:
+    """The file of a map, in the format that its suffix says."""
+    session, format = landmark_map.session, path.suffix.removeprefix(".")
+    if format in PLANS:
+        path.write_text(_plan(landmarks.walls(session), session, format), "utf-8")
+    elif format in PICTURES:
+        _draw(landmark_map, landmarks.grid(session), path, resolution)
+    else:
+        _check_landmarks(landmarks.atlas.session(session))
+        export_map(landmark_map, path)
+
+
+def _draw(
+    landmark_map: LandmarkMap, grid: OccupancyGrid | None, path: Path, resolution: float | None
+) -> None:
+    """The picture of a map, or a zip of it and of what says where it is."""
+    if grid is None:
+        export_picture(landmark_map, path.with_suffix(".png"), resolution or RESOLUTION, MOST_PIXELS)
+    elif resolution is not None:
+        raise ProblemError(
+            422,
+            f"Map {landmark_map.session} has a grid, and its picture one pixel for each cell of "
+            f"{grid.resolution:g} m: leave out resolution.",
+        )
+    elif path.suffix == ".zip":
+        write_ros_map(grid, path.with_suffix(".yaml"))
+    else:
+        Image.fromarray(shades_of(grid)).save(path)
+    if path.suffix == ".zip":
+        _pack(path)
+
+
+def _check_landmarks(session: Session) -> None:
+    """Raises NotFoundError, which says where it is, if the map is one of whole scans."""
+    grid = "a grid, in the formats png and zip" if session.grid else ""
+    walls = f"walls, in the formats svg and dxf and at /walls?session={session.id}" if session.walls else ""
+    if not session.landmarks and (grid or walls):
+        has = ", and ".join(filter(None, (grid, walls)))
+        raise NotFoundError(f"Map {session.id} has no landmarks. It has {has}.")
 
 
 def _plan(walls: WallTable, session: int, format: str) -> str:
