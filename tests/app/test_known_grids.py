@@ -144,7 +144,7 @@ def test_bytes_that_are_no_zip_are_refused(shared_server: Server) -> None:
     assert "zip cannot be read" in assert_problem(answer, 422)["detail"]
 
 
-def test_a_grid_is_no_file_of_landmarks_and_has_a_resolution_of_its_own(
+def test_a_grid_is_no_file_of_landmarks_and_is_drawn_in_its_cells_or_larger_ones(
     shared_server: Server, ros_map: Path, grid: OccupancyGrid
 ) -> None:
     body = packed(("hall.yaml", ros_map.read_bytes()), ("hall.pgm", ros_map.with_suffix(".pgm").read_bytes()))
@@ -155,9 +155,13 @@ def test_a_grid_is_no_file_of_landmarks_and_has_a_resolution_of_its_own(
     picture = {"session": session, "format": "png"}
     shades = np.asarray(Image.open(io.BytesIO(shared_server.http.get("/map", params=picture).content)))
     np.testing.assert_array_equal(shades, shades_of(grid))
+    coarse = shared_server.http.get("/map", params=picture | {"resolution": 0.21}).content
+    np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(coarse))), shades_of(grid.coarser(4)))
     for format in ("png", "zip"):
-        answer = shared_server.http.get("/map", params=picture | {"format": format, "resolution": 0.2})
-        assert "of 0.05 m: leave out resolution" in assert_problem(answer, 422)["detail"]
+        answer = shared_server.http.get("/map", params=picture | {"format": format, "resolution": 0.02})
+        assert (
+            "cells of 0.05 m, larger than 0.02 m: raise resolution" in assert_problem(answer, 422)["detail"]
+        )
 
 
 @pytest.mark.long

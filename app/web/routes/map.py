@@ -74,14 +74,15 @@ async def download(
         Query(
             ge=1e-3,
             le=1e3,
-            description=f"m a pixel, of a picture of landmarks; {RESOLUTION} if not given. A grid has its own",
+            description="m a pixel, of a picture; if not given, that of the grid, or for landmarks "
+            f"{RESOLUTION}. A grid is drawn with as many whole cells a pixel as come nearest to it",
         ),
     ] = None,
 ) -> FileResponse:
     """All landmarks of a session, in metres in its world frame. Made for one request at a time: others wait.
 
     If it has an occupancy grid, the picture is of that. 404 if there are no walls to draw a floor plan of, or a map of
-    whole scans has no landmarks; 422 if a resolution is given for anything but a picture of landmarks.
+    whole scans has no landmarks; 422 if a resolution is given for anything but a picture, or the grid is coarser.
     """
     if resolution is not None and format not in PICTURES:
         raise ProblemError(422, f"resolution is that of a picture, png or zip: leave it out for {format}.")
@@ -166,18 +167,23 @@ def _draw(
     """The picture of a map, or a zip of it and of what says where it is."""
     if grid is None:
         export_picture(landmark_map, path.with_suffix(".png"), resolution or RESOLUTION, MOST_PIXELS)
-    elif resolution is not None:
-        raise ProblemError(
-            422,
-            f"Map {landmark_map.session} has a grid, and its picture one pixel for each cell of "
-            f"{grid.resolution:g} m: leave out resolution.",
-        )
     elif path.suffix == ".zip":
-        write_ros_map(grid, path.with_suffix(".yaml"))
+        write_ros_map(_in_pixels(grid, resolution), path.with_suffix(".yaml"))
     else:
-        Image.fromarray(shades_of(grid)).save(path)
+        Image.fromarray(shades_of(_in_pixels(grid, resolution))).save(path)
     if path.suffix == ".zip":
         _pack(path)
+
+
+def _in_pixels(grid: OccupancyGrid, resolution: float | None) -> OccupancyGrid:
+    """The grid in cells of about a resolution, m. Raises ProblemError if its own are larger."""
+    cells = 1 if resolution is None else round(resolution / grid.resolution)
+    if cells < 1:
+        raise ProblemError(
+            422,
+            f"The grid has cells of {grid.resolution:g} m, larger than {resolution:g} m: raise resolution.",
+        )
+    return grid.coarser(cells)
 
 
 def _check_landmarks(session: Session) -> None:
