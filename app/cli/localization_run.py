@@ -8,6 +8,7 @@ import numpy as np
 
 from lidarcore import RecordingError, Scan, extract
 from lidarcore.clusters import cluster
+from lidarcore.errors import MapFileError
 from lidarcore.files import replacing
 from lidarcore.landmarks import FORMATS, read_landmarks, write_landmarks
 from lidarcore.localization import Landmarks, Navigator, TrackingResult, from_stored, to_stored
@@ -63,9 +64,14 @@ def tracker_in(path: Path | None, settings: Settings) -> Navigator | WholeScans:
         return Navigator(replace(settings.navigation, mode="slam"))
     if path.is_dir():
         path = path / "map.yaml"
-    if path.suffix.lower() in GRIDS:
+    is_grid = path.suffix.lower() in GRIDS
+    format = "" if is_grid else format_of(path, GRIDS)
+    if not path.exists():
+        raise MapFileError(
+            f"There is no map {path}: give its file, or the folder that `lidarcore map` wrote."
+        )
+    if is_grid:
         return WholeScans(settings.extraction, known=MapPicture(read_ros_map(path)), background=False)
-    format = format_of(path, GRIDS)
     with path.open(encoding="utf-8-sig", newline="") as file:
         known = from_stored(read_landmarks(file, format))
     return Navigator(replace(settings.navigation, mode="localize"), known)

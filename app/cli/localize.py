@@ -19,6 +19,7 @@ from .options import (
 )
 from .progress import counting
 
+_MAP = " Landmarks alone do not tell the way here: `lidarcore map` finds it from whole scans."
 _HINT = " If you know where the first scan was taken, give it by --pose."
 
 
@@ -84,4 +85,7 @@ def localize(
     )
     if not outcome.tracked and outcome.message is not None:
         typer.echo(f"No pose was found. {outcome.message}{_HINT if known and told is None else ''}")
-    typer.echo(f"{plural(outcome.scans, 'scan')}, {outcome.tracked} of them tracked{found}.")
+    few = known is None and outcome.tracked < outcome.scans / 2
+    typer.echo(
+        f"{plural(outcome.scans, 'scan')}, {outcome.tracked} of them tracked{found}.{_MAP if few else ''}"
+    )

@@ -82,14 +82,20 @@ def open_recording(
         raise RecordingError(f"The directory {path} is not a ROS 2 bag: it holds no .db3 or .mcap file.")
     if _MAP.search(head):
         raise RecordingError(
-            f"{path.name} looks like a map, not like a recording: load it in the page by Map › Load a file, "
-            "or localize a recording in it by `lidarcore localize --map`."
+            f"{path.name} looks like a map, not like a recording: {_map_of(path, head)} in the page by "
+            "Map › Load a file, or localize a recording in it by `lidarcore localize --map`."
         )
     known = ", ".join(format_.name for format_ in FORMATS)
     raise RecordingError(
         f"{path.name} is in none of the known formats: {known}. Anything else can be saved "
         "with numpy.savez as a .npz: ranges (N, B) m and bearings (B,) rad."
     )
+
+
+def _map_of(path: Path, head: bytes) -> str:
+    """What of a map is to be loaded: an image by the YAML that belongs to it, and nothing that is packed."""
+    unpacked = "unpack it, and load" if path.suffix == ".gz" else "load"
+    return f"{unpacked} {'the .yaml that belongs to it' if head.startswith(b'P') else 'it'}"
 
 
 def _head(path: Path) -> bytes:

@@ -77,7 +77,8 @@ def test_a_map_of_whole_scans_has_the_poses_of_all_scans(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--map", "nowhere.json"), "nowhere.json"),
+        (("--map", "nowhere.json"), "There is no map nowhere.json: give its file"),
+        (("--map", "nowhere.yaml"), "There is no map nowhere.yaml: give its file"),
         (("--save-map", "map.txt"), "should end in one of .json, .csv, .geojson."),
         (("--map", "map.txt"), "should end in one of .json, .csv, .geojson, .yaml, .yml."),
         (("--map", "."), "map.yaml"),
@@ -87,6 +88,13 @@ def test_what_cannot_be_is_said_in_a_sentence(
     recording: Path, arguments: tuple[str, ...], words: str
 ) -> None:
     assert_refused(run("localize", recording, *arguments), words)
+
+
+@pytest.mark.real_data
+def test_where_corners_do_not_tell_the_way_it_says_what_does(data: Path) -> None:
+    told = run("localize", data / "rplidar_rosbag1" / "lidar.bag").stdout
+    assert told.endswith("`lidarcore map` finds it from whole scans.\n")
+    assert "whole scans" not in run("localize", data / "ccny_hokuyo_rosbag1" / "demo.bag").stdout
 
 
 @pytest.mark.parametrize("command", [("map", "-o", "out"), ("localize",), ("process", "-o", "out.csv")])

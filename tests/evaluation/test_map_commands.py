@@ -61,6 +61,14 @@ def test_a_map_is_judged_by_true_poses_and_by_relations(drive: Path, tmp_path: P
     live = re.findall(r"live poses .*: ([\d.]+)% by the reference, ([\d.]+)% by the finished map", told)
     assert len(live) == 2
     assert min(float(share) for shares in live for share in shares) > 93
+    later = tmp_path / "later"
+    elsewhere = np.where(np.arange(len(ends)) < 3, 0, 1e6)[:, None] + stamps[ends]
+    for rows, said_of in (
+        (elsewhere, "3 of 10, the others of another time,"),
+        (elsewhere[3:], "none of the 7 has"),
+    ):
+        np.savetxt(later, np.column_stack([rows, np.zeros((len(rows), 6))]), fmt="%.9f")
+        assert f"relations verified by hand {said_of}" in said("map", drive, "--relations", later)
     # The relations are those of the reference.
     assert re.findall(r"by the reference +(\d+): mean 0\.0000 m, 0\.000", told) == 2 * [str(len(ends))]
 

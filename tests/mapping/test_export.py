@@ -66,6 +66,10 @@ def test_the_dxf_passes_the_audit_and_holds_the_walls_in_metres(folder):
     ends = [[tuple(line.dxf.start)[:2], tuple(line.dxf.end)[:2]] for line in lines]
     np.testing.assert_allclose(ends, room()[1].ends)
     assert len(document.modelspace().query("POINT[layer=='CORNERS']")) == 4
+    ways = document.modelspace().query("LWPOLYLINE[layer=='PATH']")
+    points = np.array([*np.reshape(ends, (-1, 2)), *(xy[:2] for way in ways for xy in way.get_points())])
+    for name, end in (("$EXTMIN", points.min(axis=0)), ("$EXTMAX", points.max(axis=0))):
+        np.testing.assert_allclose(document.header[name][:2], end, atol=1e-6)
     assert {"WALLS", "CORNERS", "PATH"} <= {layer.dxf.name for layer in document.layers}
 
 

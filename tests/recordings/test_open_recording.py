@@ -125,7 +125,14 @@ def test_packed_files_read_as_the_unpacked(tmp_path, name):
         ),
         (lambda folder: zipped_bag(folder / "drive.zip"), "a zip of other files.*unpack it.*ROS 2 bag"),
         (lambda folder: ros_map(folder / "hall.yaml"), "hall.yaml looks like a map.*Map › Load a file"),
-        (lambda folder: ros_map(folder / "hall.yaml").with_suffix(".pgm"), "hall.pgm looks like a map"),
+        (
+            lambda folder: ros_map(folder / "hall.yaml").with_suffix(".pgm"),
+            "hall.pgm looks like a map.* load the .yaml that belongs to it in the page",
+        ),
+        (
+            lambda folder: packed(ros_map(folder / "hall.yaml").with_suffix(".pgm")),
+            "hall.pgm.gz looks like a map.* unpack it, and load the .yaml that belongs to it",
+        ),
         (lambda folder: fifo(folder / "pipe"), "There is no file"),
     ],
 )
@@ -145,6 +152,13 @@ def zipped_bag(path: Path) -> Path:
         archive.writestr("drive/metadata.yaml", "rosbag2_bagfile_information:\n")
         archive.write(demo, "drive/drive_0.mcap")
     return path
+
+
+def packed(path: Path) -> Path:
+    """The file, packed beside it."""
+    beside = path.with_name(f"{path.name}.gz")
+    beside.write_bytes(gzip.compress(path.read_bytes()))
+    return beside
 
 
 def ros_map(path: Path) -> Path:

@@ -95,8 +95,11 @@ def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
         yield "live poses", f"inside the 95 % ellipsoids claimed when each came: {', '.join(held)}"
     found = judged.relations
     at_scans = found[found[:, 2] <= _AT_A_SCAN]
+    if judged.given and not len(found):
+        yield "relations verified by hand", f"none of the {judged.given} has stamps of this recording"
     if len(found):
-        yield "relations verified by hand", f"{len(found)}, poses interpolated: {_errors(found)}"
+        all_ = "" if len(found) == judged.given else f" of {judged.given}, the others of another time"
+        yield "relations verified by hand", f"{len(found)}{all_}, poses interpolated: {_errors(found)}"
     if 0 < len(at_scans) < len(found):
         within = f"{1e3 * _AT_A_SCAN:g} ms of a scan"
         yield "  of these", f"{len(at_scans)} with both stamps within {within}: {_errors(at_scans)}"

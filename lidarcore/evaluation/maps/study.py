@@ -47,7 +47,8 @@ class MapStudy:
                 covariances claimed then, 3 dof; seen from the first scan
     live_by_map
                 (N,) the same by the finished map
-    relations   (R, 3) m and rad errors of relations verified by hand, and s from their stamps to the next scan
+    given       number of relations verified by hand that were to be looked at
+    relations   (R, 3) m and rad errors of those of them that are of this time, and s from their stamps to the next scan
     of_reference
                 (R, 3) the same of the reference poses, (0, 3) without them
     """
@@ -64,6 +65,7 @@ class MapStudy:
     allowed: Array
     live: Array
     live_by_map: Array
+    given: int
     relations: Array
     of_reference: Array
 
@@ -126,7 +128,7 @@ def study(
             theirs = relation_errors(relations, stamps, reference)
     return MapStudy(
         len(scans), tracked, len(numbers), len(mapper.loops), wrong, seconds, _most_megabytes(),
-        pairs, normalised, allowed, live, by_map, found, theirs,
+        pairs, normalised, allowed, live, by_map, 0 if relations is None else len(relations.stamps), found, theirs,
     )  # fmt: skip
 
 

@@ -49,6 +49,7 @@ def plan_svg(ends: Array, corners: Array, path: Array) -> str:
 def plan_dxf(ends: Array, corners: Array, path: Array) -> str:
     """The same as a DXF (R2010) in metres, with the layers WALLS, CORNERS and PATH."""
     import ezdxf  # here: importing it takes a second, and a server that starts needs none
+    from ezdxf import zoom
 
     document = ezdxf.new("R2010", units=ezdxf.units.M)
     for name, colour in _LAYERS.items():
@@ -60,6 +61,11 @@ def plan_dxf(ends: Array, corners: Array, path: Array) -> str:
         space.add_point(xy, dxfattribs={"layer": "CORNERS"})
     if len(path) > 1:
         space.add_lwpolyline(path.tolist(), dxfattribs={"layer": "PATH"})
+    points = np.concatenate([ends.reshape(-1, 2), corners, path])
+    if len(points):  # what programs show at first
+        space.reset_extents((*points.min(axis=0), 0), (*points.max(axis=0), 0))
+        document.header["$EXTMIN"], document.header["$EXTMAX"] = space.dxf.extmin, space.dxf.extmax
+        zoom.window(space, points.min(axis=0), points.max(axis=0))
     text = io.StringIO()
     document.write(text)
     return text.getvalue()
