@@ -19,7 +19,7 @@ from lidarcore.mapping.walls import WallTable
 from ..errors import ConflictError
 from ..sources.odometry_feed import OdometryFeed, OdometryStatus
 from ..sources.timed_scan import TimedScan
-from .settings import LiveNavigation, Settings
+from .settings import LiveNavigation, Method, Settings
 from .slam_run import Localization, MapRun, Run
 from .trails import NO_PATHS, Paths, TrackedPose, Trails
 
@@ -74,12 +74,13 @@ class MapStore(Protocol):
 class LocalizationStatus:
     """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what.
 
-    A choice that was localized in ends when SLAM begins another map.
+    A choice that was localized in ends when SLAM begins another map. SLAM goes by the method that is chosen, a known
+    map by what it holds: null before the first scan in it.
     `extent` is that of the grid that is localized in, if it is one: from and to along x, then along y, m.
     """
 
     mode: Literal["off", "localize", "slam"]
-    method: Literal["scans", "landmarks"] | None
+    method: Method | None
     session: int | None
     map: int | None
     extent: Extent | None
@@ -110,7 +111,7 @@ class Navigation:
         return run.session if run else None
 
     @property
-    def method(self) -> Literal["scans", "landmarks"] | None:
+    def method(self) -> Method | None:
         """What tells the pose; None before the first scan of a run."""
         run = self._run
         return None if run is None else "scans" if isinstance(run.navigator, WholeScans) else "landmarks"

@@ -25,7 +25,7 @@ from .frame import Frame, Selection
 from .navigation import NOT_LOCALIZED, LocalizationStatus, Navigation
 from .newest import NewestScan
 from .sensor_setups import SensorSetup, SensorSetups
-from .settings import Settings
+from .settings import Method, Settings
 
 logger = logging.getLogger(__name__)
 
@@ -59,6 +59,7 @@ class Runtime:
         self.frame_listeners: list[Callable[[Frame], None]] = []
         self.change_listeners: list[Callable[[], None]] = []
         self._draw = draw
+        self._set_up = source  # whose noise and mask the settings hold, before the player has opened it
         self._newest = NewestScan()
         self.player = Player(source, self._newest.put, lambda: self._newest.idle, self.announce)
         navigation.map_listeners.append(self._show_map)
@@ -84,7 +85,7 @@ class Runtime:
     def set(self, patch: Mapping[str, Any]) -> Settings:
         """Change settings by a merge patch; the only way there is. Raises pydantic.ValidationError."""
         with self._lock:
-            before, source = _setup(self.settings), self.player.source
+            before, source = _setup(self.settings), self._set_up
             settings = self.settings.patched(patch)
             if settings.sensor.mask is None:
                 settings = settings.with_setup(SensorSetup(settings.extraction.noise, source.mask))
@@ -115,13 +116,19 @@ class Runtime:
         """What is localized, and in which map."""
         return LocalizationStatus(
             mode=self.settings.navigation.mode,
-            method=self.navigation.method,
+            method=self._method(),
             session=self.navigation.session,
             map=self.navigation.map,
             extent=self.navigation.extent,
             problem=self.navigation.problem,
             odometry=self.navigation.odometry.status(self._why_not_fed()),
         )
+
+    def _method(self) -> Method | None:
+        """What tells the pose: SLAM goes by what is chosen, a known map by what it holds, told by its first scan."""
+        wanted = self.settings.navigation
+        by_mode = {"off": None, "slam": wanted.method, "localize": self.navigation.method}
+        return by_mode[wanted.mode]
 
     def _why_not_fed(self) -> str | None:
         """Why the newest scan takes no odometry from outside, if so."""
@@ -140,7 +147,7 @@ class Runtime:
         """Play another source, with the noise and the mask of its sensor."""
         self.selection = Selection()
         with self._lock:
-            self.settings = self.settings.with_setup(self._setups.of(source))
+            self.settings, self._set_up = self.settings.with_setup(self._setups.of(source)), source
         self.player.open(source, index, paused)
 
     def suggested_mask(self) -> tuple[Sector, ...]:

@@ -20,6 +20,7 @@ from lidarcore.localization import NavigationSettings
 from .sensor_setups import SensorSetup
 
 Colour = Literal["plain", "segment", "quality", "range"]
+Method = Literal["scans", "landmarks"]
 
 
 class _Frozen(BaseModel):
@@ -106,7 +107,7 @@ class LiveNavigation(NavigationSettings):
     """What a navigator does with each scan, and what SLAM makes its map of."""
 
     method: Annotated[
-        Literal["scans", "landmarks"],
+        Method,
         Field(description="what SLAM finds the pose by: whole scans matched to each other, or landmarks"),
     ] = "scans"
 

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from itertools import islice
 from pathlib import Path
 
 import httpx
@@ -13,11 +14,15 @@ import lidarcore_app.web.stream
 import numpy as np
 import pytest
 import websockets
+from lidarcore_app.jobs.wall_writer import grid_to_stored
 from lidarcore_app.pipeline.newest import NewestScan
 from lidarcore_app.web.stream import Mailbox
 from lidarcore_app.web.transport import SEND_BUFFER
 from serving import CORNERS, ROOT, Json, Server, strict_json, write_room
 from waiting import PATIENCE
+
+from lidarcore import open_recording
+from lidarcore.mapping.grid import build_grid
 
 RECEIVE_BUFFER = 8192
 
@@ -56,10 +61,15 @@ def test_walls_of_the_map_are_told_of_when_they_change_and_to_who_comes_later(se
 
 
 def test_a_run_that_begins_is_told_of_though_nothing_else_changes(server: Server) -> None:
-    """What a recording is localized by is known with its first scan; no counters of a live source bring it along."""
-    server.play(write_room(server.folder / "long.npz", scans=600))
+    """What a known map is localized by is known with the first scan; no counters of a live source bring it along."""
+    path = write_room(server.folder / "long.npz", scans=600)
+    scans = list(islice(open_recording(path), 5))
+    hall = server.app.state.server.landmarks.atlas.begin("hall", 1.0)
+    hall.put_grid(grid_to_stored(build_grid(scans, np.zeros((len(scans), 3)))))
+    server.play(path)
     with server.stream() as stream:
-        server.change("PATCH", "/settings", {"navigation": {"mode": "slam", "method": "scans"}})
+        stream.state(lambda state: state["source"]["complete"])  # which is a change, too
+        server.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
         state = stream.state(lambda state: state["localization"]["method"] == "scans")
         newest = stream.frame()["sequence"]
         server.change("PATCH", "/source", {"index": 0})  # the next run is one of the same kind

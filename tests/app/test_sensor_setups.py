@@ -116,3 +116,25 @@ def test_without_a_memory_that_can_be_written_the_session_goes_on(tmp_path: Path
     setups = SensorSetups(SensorMemory(tmp_path / "file" / "sensors.json"))
     setups.tell(Device("A"), SETUP)
     assert setups.of(Device("A")) == SETUP
+
+
+def test_what_is_set_while_another_source_is_being_opened_is_set_for_that_one(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one, two = (RecordingSource(write_room(server.folder / name, scans=2)) for name in ("one.npz", "two.npz"))
+    runtime = server.app.state.server.runtime
+    runtime.open(one)
+    before, opened = runtime.settings.extraction.noise, runtime.player.open
+
+    def meanwhile(*arguments: object) -> None:
+        runtime.set({"extraction": {"noise": {"sigma_range": 0.0123}}})
+        opened(*arguments)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(runtime.player, "open", meanwhile)
+        runtime.open(two)
+    assert runtime.settings.extraction.noise.sigma_range == 0.0123
+    runtime.open(one)
+    assert runtime.settings.extraction.noise == before
+    runtime.open(two)
+    assert runtime.settings.extraction.noise.sigma_range == 0.0123
