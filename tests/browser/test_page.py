@@ -68,6 +68,7 @@ def test_the_scene_is_drawn_once_for_each_scan(visitor: Visitor) -> None:
     assert count <= 2 * 8 + seldom
 
 
+@pytest.mark.real_data
 def test_while_a_recording_is_paused_nothing_comes_at_any_rate(visitor: Visitor) -> None:
     visitor.server.show(GOLF, 2)
     expect(visitor.page.locator("#readout-rate")).to_have_text("\u2013")
