@@ -1,7 +1,7 @@
 """The command `lidarcore localize`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -18,6 +18,11 @@ from .options import (
     to_file,
 )
 from .progress import counting
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from .localization_run import Outcome
 
 _MAP = " Landmarks alone do not tell the way here: `lidarcore map` finds it from whole scans."
 _HINT = " If you know where the first scan was taken, give it by --pose."
@@ -53,22 +58,14 @@ def localize(
     set_: Set = None,
 ) -> None:
     """Track the sensor through a recording, in a known map or in one of landmarks that is built on the way."""
-    if known is not None and save_map is not None:
-        raise typer.BadParameter("give --map or --save-map: a known map stays as it is.")
-    if pose is not None and known is None:
-        raise typer.BadParameter("give --pose with --map: SLAM begins where the first scan was taken.")
+    _check(output, known, save_map, pose)
     from lidarcore import files, open_recording
 
     from ..pipeline.tables import csv_text
-    from .localization_run import format_of, place, track, tracker_in, write_map
+    from .localization_run import place, track, tracker_in, write_map
 
     told = None if pose is None else numbers("--pose", pose, "a pose in m, m, rad", "1.2,-0.5,1.57")
     chosen = settings_from(settings, set_)
-    if output is not None:
-        check_folder(output)
-    if save_map is not None:
-        format_of(save_map)
-        check_folder(save_map, "--save-map")
     tracker = tracker_in(known, chosen)
     if told is not None:
         place(tracker, told)
@@ -80,12 +77,31 @@ def localize(
         files.write(output, csv_text(outcome.columns))
     if save_map is not None and outcome.landmarks is not None:
         write_map(save_map, outcome.landmarks, chosen.landmark_method)
-    found = (
-        "" if outcome.landmarks is None else "; " + plural(int(outcome.landmarks.confirmed.sum()), "landmark")
-    )
+    for sentence in _told(outcome, by_slam=known is None, from_pose=told is not None):
+        typer.echo(sentence)
+
+
+def _check(output: Path | None, known: Path | None, save_map: Path | None, pose: str | None) -> None:
+    """Raises BadParameter or RecordingError if options do not go together, or a file cannot be written at the end."""
+    from .localization_run import format_of
+
+    if known is not None and save_map is not None:
+        raise typer.BadParameter("give --map or --save-map: a known map stays as it is.")
+    if pose is not None and known is None:
+        raise typer.BadParameter("give --pose with --map: SLAM begins where the first scan was taken.")
+    if output is not None:
+        check_folder(output)
+    if save_map is not None:
+        format_of(save_map)
+        check_folder(save_map, "--save-map")
+
+
+def _told(outcome: "Outcome", *, by_slam: bool, from_pose: bool) -> "Iterator[str]":
+    """What came of it, and what would help where that is little."""
     if not outcome.tracked and outcome.message is not None:
-        typer.echo(f"No pose was found. {outcome.message}{_HINT if known and told is None else ''}")
-    few = known is None and outcome.tracked < outcome.scans / 2
-    typer.echo(
-        f"{plural(outcome.scans, 'scan')}, {outcome.tracked} of them tracked{found}.{_MAP if few else ''}"
-    )
+        hint = "" if by_slam or from_pose else _HINT
+        yield f"No pose was found. {outcome.message}{hint}"
+    found = outcome.landmarks
+    landmarks = "" if found is None else "; " + plural(int(found.confirmed.sum()), "landmark")
+    other = _MAP if by_slam and outcome.tracked < outcome.scans / 2 else ""
+    yield f"{plural(outcome.scans, 'scan')}, {outcome.tracked} of them tracked{landmarks}.{other}"

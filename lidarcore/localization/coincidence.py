@@ -1,4 +1,4 @@
-"""What of a scan lies on landmarks by chance: a pose found, and a single pair."""
+"""Whether a pose that was found, or pairs of points seen and landmarks, may be chance."""
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -9,9 +9,7 @@ from lidarcore.geometry import act, chi_square_gate, rotation, squared_mahalanob
 from lidarcore.localization.points import Points
 
 _GATE = chi_square_gate(0.999)  # of what is called lying on a landmark
-_OWN = (
-    1.0  # m² that a landmark has to itself: a single one, or several in a row, are not dense beyond measure
-)
+_OWN = 1.0  # m² that each landmark has to itself, so that a single one, or a row of them, is not infinitely dense
 _FIXED = 2  # points that a pose is made from lie on landmarks whatever it is
 
 

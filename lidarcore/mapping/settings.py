@@ -39,7 +39,7 @@ class MatchSettings:
         1,
         50,
         "m",
-        "the coarse match leaves out what is farther away than this and than half of it",
+        "the coarse match leaves out what is farther away, unless most is",
         default=12.0,
     )
     max_shift: float = number(0, 30, "m", "the coarse match never looks farther than this", default=10.0)

@@ -41,7 +41,8 @@ class Recording(ABC):
     damaged or truncated file is yielded, and `notes` say so. Iterate in one place at a time: an iteration
     starts the counts in `notes` again.
 
-    A format is a module of this package with a concrete subclass: `name`, `signature`, `_open`, `_scans`.
+    A format is a module of this package with a concrete subclass: `name`, `signature`, `_open`, `_scans`; packages in
+    it export theirs.
     """
 
     name: ClassVar[str]

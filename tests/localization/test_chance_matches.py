@@ -34,7 +34,7 @@ def test_scans_of_another_place_are_not_found_in_a_map() -> None:
     assert believed <= 2
 
 
-def test_as_many_landmarks_are_found_by_where_the_others_stand() -> None:
+def test_in_a_map_of_posts_every_scan_is_found() -> None:
     rng, found = np.random.default_rng(2), 0
     landmarks = Points(POSTS, 0.02**2 * np.eye(2), "post")
     for pose in (poses := true_path(110)[::5]):

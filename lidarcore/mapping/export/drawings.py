@@ -63,9 +63,9 @@ def plan_dxf(ends: Array, corners: Array, path: Array) -> str:
         space.add_lwpolyline(path.tolist(), dxfattribs={"layer": "PATH"})
     points = np.concatenate([ends.reshape(-1, 2), corners, path])
     if len(points):  # what programs show at first
-        space.reset_extents((*points.min(axis=0), 0), (*points.max(axis=0), 0))
-        document.header["$EXTMIN"], document.header["$EXTMAX"] = space.dxf.extmin, space.dxf.extmax
-        zoom.window(space, points.min(axis=0), points.max(axis=0))
+        low, high = points.min(axis=0), points.max(axis=0)
+        document.header["$EXTMIN"], document.header["$EXTMAX"] = (*low, 0), (*high, 0)
+        zoom.window(space, low, high)
     text = io.StringIO()
     document.write(text)
     return text.getvalue()

@@ -10,10 +10,9 @@ from lidarcore.geometry import wrap
 from lidarcore.geometry.kernels import rotate
 from lidarcore.scan import Scan
 
-_APART, _BEAMS = (
-    0.1,
-    2.0,
-)  # rad, and beams' spacing, between returns beyond which nothing was seen between them
+# Between returns farther apart than both nothing was seen.
+_APART = 0.1  # rad
+_BEAMS = 2.0  # times the spacing of beams
 
 
 class Sight(NamedTuple):

@@ -8,7 +8,7 @@ import numpy as np
 
 from lidarcore.files.streams import lines
 from lidarcore.recordings.base import MOST_BEAMS
-from lidarcore.recordings.revolutions import Revolution, RplidarRecording
+from lidarcore.recordings.rplidar.revolutions import Revolution, RplidarRecording
 
 FLAGGED = b"newscan,angle,distance"
 STATIONS = b"station,rev,angle_deg,distance_mm"

@@ -7,7 +7,7 @@ import numpy as np
 
 from lidarcore.files.streams import lines
 from lidarcore.recordings.base import MOST_BEAMS
-from lidarcore.recordings.revolutions import Revolution, RplidarRecording
+from lidarcore.recordings.rplidar.revolutions import Revolution, RplidarRecording
 
 NUMBER = rb"([-+]?\d+(?:\.\d*)?)"
 PRINTED = re.compile(rb"theta: *%b +Dist: *%b +Q: *%b" % (NUMBER, NUMBER, NUMBER))
