@@ -63,8 +63,10 @@ def plan_dxf(ends: Array, corners: Array, path: Array) -> str:
         space.add_lwpolyline(path.tolist(), dxfattribs={"layer": "PATH"})
     points = np.concatenate([ends.reshape(-1, 2), corners, path])
     if len(points):  # what programs show at first
-        low, high = points.min(axis=0), points.max(axis=0)
-        document.header["$EXTMIN"], document.header["$EXTMAX"] = (*low, 0), (*high, 0)
+        low, high = (*points.min(axis=0), 0), (*points.max(axis=0), 0)
+        space.reset_extents(low, high)
+        # What is written is that of the space, but not where it is the origin.
+        document.header["$EXTMIN"], document.header["$EXTMAX"] = low, high
         zoom.window(space, low, high)
     text = io.StringIO()
     document.write(text)
