@@ -1,14 +1,18 @@
 """A port that cannot be used says why, and what to do about it."""
 
 import grp
+import itertools
 import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 import pytest
+import serial
 from serial import Serial
 
 from lidarcore.errors import NoDeviceError, PortBusyError, UnpluggedError
@@ -25,6 +29,7 @@ try:
 except DeviceError as error:
     print(type(error).__name__, error)
 """
+PYSERIAL = os.path.dirname(serial.__file__)
 HOLD_IT = "import os, sys; os.open(sys.argv[1], os.O_RDWR | os.O_NOCTTY); print('open', flush=True); sys.stdin.read()"
 
 
@@ -34,8 +39,10 @@ class Line:
     def __init__(self) -> None:
         self.far, self._near = os.openpty()
         self.path = os.ttyname(self._near)
+        self.is_cut = False
 
     def cut(self) -> None:
+        self.is_cut = True
         for end in (self.far, self._near):
             os.close(end)
 
@@ -45,6 +52,26 @@ def line() -> Iterator[Line]:
     line = Line()
     yield line
     line.cut()
+
+
+@contextmanager
+def cut_before(moment: int, line: Line) -> Iterator[None]:
+    """Cut the line before line number `moment` of pyserial's code is run."""
+    lines = itertools.count(1)
+
+    def trace(frame: FrameType, event: str, _: object) -> Callable[..., object] | None:
+        if not frame.f_code.co_filename.startswith(PYSERIAL):
+            return None
+        if event == "line" and next(lines) == moment:
+            line.cut()
+        return trace
+
+    before = sys.gettrace()
+    sys.settrace(trace)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
 
 
 def test_a_port_that_is_not_there() -> None:
@@ -163,6 +190,24 @@ def test_a_cut_line_is_unplugged_to_reader_and_writer_and_can_be_closed() -> Non
         port.write(b"x")
     port.close()
     port.close()
+
+
+def test_a_port_that_goes_away_while_it_is_opened_is_missed_at_whatever_line() -> None:
+    """Cut before the first, second, ... line that pyserial runs, until it has opened the port before it is cut."""
+    for moment in itertools.count(1):
+        line = Line()
+        try:
+            with cut_before(moment, line):
+                port = Port(line.path, 256_000)
+        except NoDeviceError:
+            continue
+        if not line.is_cut:
+            break
+        with pytest.raises(UnpluggedError):
+            port.read()
+    port.close()
+    line.cut()
+    assert moment > 50
 
 
 def test_a_cancelled_port_is_not_read_any_more(line: Line) -> None:

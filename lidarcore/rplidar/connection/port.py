@@ -172,15 +172,17 @@ def _program(process: str) -> str:
 
 
 def _opening_error(path: str, baud: int, error: Exception) -> DeviceError:
-    match getattr(error, "errno", None):
+    # What the system says to an unusual baud rate, pyserial raises as ValueError, also of a port that went away.
+    reason = error.__context__ if isinstance(error, ValueError) else error
+    match getattr(reason, "errno", None):
         case errno.ENOENT | errno.ENODEV | errno.ENXIO:
             return NoDeviceError(f"There is no port {path}: {ports_there_are()}")
         case errno.EACCES | errno.EPERM:
             return PortPermissionError(f"You may not open {path}: {_remedy(path)}.")
         case errno.EBUSY | errno.EAGAIN:
             return _busy(path, holders(path))
-    if isinstance(error, ValueError):
-        return DeviceError(f"{path} cannot be set to {baud} baud: the RPLIDAR S1 talks at 256000.")
+        case number if isinstance(error, ValueError) and number != errno.EIO:
+            return DeviceError(f"{path} cannot be set to {baud} baud: the RPLIDAR S1 talks at 256000.")
     return NoDeviceError(f"{path} cannot be used as a serial port ({error}): {ports_there_are()}")
 
 
