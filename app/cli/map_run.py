@@ -47,11 +47,9 @@ def build(recording: Recording, settings: Settings, progress: Callable[[int], No
 
 def write_files(folder: Path, built: Built, settings: Settings) -> Walls:
     """All files of the map, or none; its walls. Raises GridError or MapFileError."""
-    keyframes, poses = built.mapper.keyframes, built.mapper.trajectory()[1]
-    grid = build_grid(keyframes.scans, keyframes.poses)
-    walls = find_walls(
-        keyframes.scans, keyframes.poses, keyframes.covariances, grid, extraction=settings.extraction
-    )
+    views, poses = built.mapper.views, built.mapper.trajectory()[1]
+    grid = build_grid(views.scans, views.poses)
+    walls = find_walls(views.scans, views.poses, views.covariances, grid, extraction=settings.extraction)
     write_map(folder, grid, walls, poses, {"poses.csv": poses_csv(built)})
     return walls
 

@@ -12,7 +12,7 @@ from lidarcore.mapping.walls import WallTable
 
 from .session_writer import SessionWriter
 
-CONFIRMED = 3  # keyframes that saw a wall; what fewer saw may have been somebody who stood there
+CONFIRMED = 3  # scans of the map that saw a wall; what fewer saw may have been somebody who stood there
 
 
 class WallWriter(SessionWriter):

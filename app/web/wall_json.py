@@ -16,8 +16,8 @@ class WallJson(TypedDict):
     """A surface seen from one side: x cos(alpha) + y sin(alpha) = r, rad and m, in the frame of the map.
 
     `covariance` is of (alpha, r); `ended` is false at an end beyond which the wall may go on, for nobody looked there;
-    `count` keyframes saw it. `id` stays while the map grows and bends, and is not given twice in one map. Walls that
-    become one keep the oldest id; the longest part of a wall that is cut keeps its id.
+    `count` scans of the map saw it. `id` stays while the map grows and bends, and is not given twice in one map. Walls
+    that become one keep the oldest id; the longest part of a wall that is cut keeps its id.
     """
 
     id: int

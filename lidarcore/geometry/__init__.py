@@ -34,9 +34,10 @@ from lidarcore.geometry.se2 import (
     unit_vectors,
     wrap,
 )
-from lidarcore.geometry.uncertain_pose import UncertainPose, as_pose_covariance
+from lidarcore.geometry.uncertain_pose import HERE, UncertainPose, as_pose_covariance
 
 __all__ = [
+    "HERE",
     "PoseTrack",
     "UncertainPose",
     "act",

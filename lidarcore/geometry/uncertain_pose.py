@@ -58,6 +58,10 @@ class UncertainPose(NamedTuple):
         return UncertainPose(relative(self.pose, T_a_c.pose), covariance)
 
 
+HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
+"""Where a frame is, seen from itself."""
+
+
 def as_pose_covariance(values: ArrayLike, name: str) -> Array:
     """The covariance (3, 3) of a pose. Raises CovarianceError if it is none."""
     P = np.array(values, np.float64)

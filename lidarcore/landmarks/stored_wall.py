@@ -19,7 +19,7 @@ class StoredWall:
     ended_1, ended_2                  0 at an end beyond which the wall may go on, for nobody looked there
     corner_1, corner_2                1 at an end that is a corner
     first_seen, last_seen             s
-    count                             number of keyframes that saw it
+    count                             number of scans of the map that saw it
     """
 
     id: int

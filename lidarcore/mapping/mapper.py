@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import UncertainPose, compose, inverse, relative
+from lidarcore.geometry import HERE, UncertainPose, compose, inverse, relative
 from lidarcore.mapping.between import Ties, covariances, kept
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Refined
@@ -21,7 +21,6 @@ from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
 
 _SEARCHES = 2  # for passes that no loop ties: the first may bring others near enough
-_HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,13 +69,13 @@ class Mapper:
         local = compose(self._locals[tracked.node], tracked.tie.pose) if self._locals else np.zeros(3)
         tie = tracked.node, tracked.tie
         if tracked.keyframe:
-            tie = len(self._numbers), _HERE
+            tie = len(self._numbers), HERE
             self._numbers.append(len(self._ties))
             self._locals.append(local)
             self._refined = None
         if tracked.first is not None:
             self._motions[0] = _motion_of(tracked.first)
-        if tracked.is_news:
+        if tracked.is_news or tracked.view:
             self._back.add(tracked)
         self._motions.append(_motion_of(tracked))
         self._stamps.append(tracked.stamp)
@@ -144,6 +143,14 @@ class Mapper:
         return Keyframes(
             np.array(self._numbers, np.int64), scans, self._poses, self._known.covariances()[: len(scans)]
         )
+
+    @property
+    def views(self) -> Keyframes:
+        """The scans that grid and walls are made of: the keyframes, and the last ones where the sensor stood longer."""
+        views = self._back.views
+        numbers = np.array([view.number for view in views], np.int64)
+        poses, covariances = self.trajectory()[1], self.covariances()
+        return Keyframes(numbers, tuple(view.scan for view in views), poses[numbers], covariances[numbers])
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j of keyframes i and j with its covariance."""

@@ -31,7 +31,7 @@ def warm_up() -> None:
     for scan in scans:
         mapper.step(scan)
     mapper.finish()
-    found = mapper.keyframes
+    found = mapper.views
     grid = build_grid(found.scans, found.poses)
     find_walls(found.scans, found.poses, found.covariances, grid)
     Relocator(grid).find(query_of([scans[-1]]))

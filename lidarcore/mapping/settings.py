@@ -70,6 +70,9 @@ class FrontSettings:
         0, 10, "m", "a scan this far from the last keyframe is one", default=0.3
     )
     keyframe_turn: float = number(0, 3.15, "rad", "a scan turned this much is a keyframe", default=0.26)
+    standing: float = number(
+        0.01, 1e6, "s", "while the sensor stands, the map takes a scan this often", default=1.0
+    )
     keyframes: int = whole(1, 100, "last keyframes that make the local map", default=10)
     inliers: float = number(
         0.05, 1, "", "share of a scan that must lie on the local map to be tied to it", default=0.15

@@ -12,6 +12,7 @@ from lidarcore.scan import Scan
 class Tracked:
     """Where a scan was taken, in the local frame.
 
+    number    of scans that were placed before it
     stamp     s
     node      number of the keyframe that the scan hangs on; its own if it is one
     tie       T_node_scan (3,) with its covariance (3, 3), of the keyframe before if the scan is one itself
@@ -23,11 +24,13 @@ class Tracked:
     sweep     (3, 3) how far the scan may stand from where the sensor was at its stamp, a part of tie's covariance
     velocity  (3,) m/s, m/s, rad/s that was taken out of the scan
     keyframe  whether the scan is one
+    view      whether the scan, while the sensor stands, tells what has changed around it
     island    True if it lies on nothing known, or fits in several places, and its heading is vague: how it, and what
               follows, lies to what was before is open
     first     the first keyframe anew, now that the motion in it is known; told once, with the second scan
     """
 
+    number: int
     stamp: float
     node: int
     tie: UncertainPose
@@ -39,6 +42,7 @@ class Tracked:
     sweep: Array
     velocity: Array
     keyframe: bool
+    view: bool
     island: bool
     first: "Tracked | None" = None
 

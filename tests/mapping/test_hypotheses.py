@@ -52,7 +52,7 @@ def newest_on_first(world, off):
     keyframes = {}
     for k, pose in enumerate(truth):
         scan = sick_scan(world, pose, NOISE, rng)
-        keyframes[k] = Keyframe(scan, patches(scan, MATCH), sight(scan), np.zeros((3, 3)))
+        keyframes[k] = Keyframe(k, scan, patches(scan, MATCH), sight(scan), np.zeros((3, 3)))
     return truth, graph, keyframes
 
 

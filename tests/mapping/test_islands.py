@@ -27,7 +27,7 @@ def charted(graph, keyframes, world, poses, at):
     for seen_from, pose in zip(poses, at, strict=True):
         scan = full_scan(world, seen_from, NOISE, rng)
         keyframes[len(keyframes)] = Keyframe(
-            scan, patches(scan, MatchSettings(noise=NOISE)), sight(scan), np.zeros((3, 3))
+            len(keyframes), scan, patches(scan, MatchSettings(noise=NOISE)), sight(scan), np.zeros((3, 3))
         )
         if len(keyframes) > 1:
             node = graph.add(pose)

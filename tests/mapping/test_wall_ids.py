@@ -32,10 +32,10 @@ def scans_of(world: World, poses: Array, seed: int = 1) -> list[Scan]:
     return [full_scan(world, pose, NOISE, rng) for pose in poses]
 
 
-def picture(scans: list[Scan], poses: Array, nodes: Ints | None = None) -> Walls:
+def picture(scans: list[Scan], poses: Array, numbers: Ints | None = None) -> Walls:
     covariances = np.tile(1e-8 * np.eye(3), (len(scans), 1, 1))
     grid = build_grid(scans, poses)
-    return find_walls(scans, poses, covariances, grid, extraction=EXTRACTION, nodes=nodes)
+    return find_walls(scans, poses, covariances, grid, extraction=EXTRACTION, numbers=numbers)
 
 
 def across(n: int, y: float) -> Array:

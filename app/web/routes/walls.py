@@ -109,7 +109,7 @@ def walls(
 ) -> Response:
     """The walls of the map that SLAM makes of whole scans, all or those asked for. 404 if it makes none.
 
-    A wall is in a box or circle if any part of it is. Kept with a session are those that three keyframes saw or more.
+    A wall is in a box or circle if any part of it is. With a session those are kept that three scans of the map saw.
     """
     chosen = np.flatnonzero(which(asked) & _within(asked, region)).tolist()
     if format == "json":

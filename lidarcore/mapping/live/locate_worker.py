@@ -86,8 +86,10 @@ class LocateWorker(Background):
         if isinstance(item, UncertainPose):
             self._here, self._misses, self._begin, self._is_confirmed = item, 0, self._local, True
             self._verdict = "coasting", _NOT_SEEN
-        else:
+        elif item.is_news:
             self._go_on(item)
+        else:  # a sensor that stands sees what it has seen
+            return
         if self._recent:
             try:
                 self._look(waiting)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from lidarcore.errors import GridError, LocalizationError
-from lidarcore.geometry import UncertainPose, pose_difference
+from lidarcore.geometry import UncertainPose, compose, pose_difference
 from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.grid import GridBuilder, GridSettings, OccupancyGrid
 from lidarcore.mapping.live.background import Background, Corrected, MapPicture
@@ -21,6 +21,7 @@ from lidarcore.threads import FailureLog
 
 _EVERY = 1.0  # s between two pictures of the map, at least
 _REST = 10.0  # times as long as the walls took to find, they are not sought again
+_STANDING = 3.0  # s for which they are not either while no keyframe comes
 _THINNED_EVERY = 50  # keyframes
 _TURNED = 0.005  # rad by which a keyframe turns until the grid is drawn anew: a cell at 10 m
 _MOST_CELLS = 16_000_000  # of the grid; a larger building gets larger cells
@@ -53,8 +54,8 @@ class MapWorker(Background):
         self._back = BackEnd(settings)
         self._begin_grid(GridSettings(most_cells=_MOST_CELLS))
         self._wall_ids = WallIds()
-        self._next_picture = self._next_walls = 0.0
-        self._walled = 0  # nodes that the walls know
+        self._next_picture = self._next_walls = self._wait = 0.0
+        self._known = self._walled = 0  # up to which of the scans grid or walls should know, and walls do
         self._failures = FailureLog("the map could not be brought up to date")
         self._worker = Worker(self._work, "map", idle=_EVERY, last=self._finish)
 
@@ -75,27 +76,34 @@ class MapWorker(Background):
     def _step(self, tracked: Tracked | None, waiting: int) -> None:
         if tracked is not None:
             self._add(tracked)
-        now, known = time.monotonic(), len(self._back.graph) if self._back.keyframes else 0
-        lacks = len(self._drawn) < known or (self._walled < known and now >= self._next_walls)
+        now = time.monotonic()
+        lacks = self._drawn_to < self._known or self._lacks_walls(now)
         if lacks and now >= self._next_picture:
             self._draw()
 
+    def _lacks_walls(self, now: float) -> bool:
+        return self._walled < self._known and now >= self._next_walls + self._wait
+
     def _finish(self) -> None:
         """What is kept knows all keyframes that were added, also those since walls were sought last."""
-        self._next_walls = 0.0
+        self._next_walls = self._wait = 0.0
         with self._failures():
-            if self._keep and self._walled < len(self._back.graph) and self._back.keyframes:
+            if self._keep and self._walled < self._known:
                 self._draw()
 
     def _add(self, tracked: Tracked) -> None:
         self._back.add(tracked)
+        if tracked.keyframe or tracked.view:
+            self._known = tracked.number + 1
+        if tracked.keyframe:
+            self._wait = 0.0
         graph = self._back.graph
         self.corrected = Corrected(len(graph), graph.poses, graph.covariance(len(graph) - 1))
         if len(graph) % _THINNED_EVERY == 0:
             self._back.thin()
         if tracked.first is not None:
             self._begin_grid(self._builder.settings)
-            self._walled = 0
+            self._walled, self._wait = 0, 0.0
 
     def _draw(self) -> None:
         self._next_picture = time.monotonic() + _EVERY
@@ -108,31 +116,34 @@ class MapWorker(Background):
         grid = self._builder.grid()
         self.picture = MapPicture(grid, self.picture.walls if self.picture else None)
         begin = time.monotonic()
-        if begin >= self._next_walls:
+        if self._lacks_walls(begin):
             self.picture = MapPicture(grid, walls := self._walls(grid))
-            self._walled = len(self._back.graph)
+            self._walled = self._drawn_to
             if self._keep:
                 self._keep(grid, walls)
             end = time.monotonic()
-            self._next_walls = end + _REST * (end - begin)
+            self._next_walls, self._wait = end + _REST * (end - begin), _STANDING
 
     def _begin_grid(self, settings: GridSettings) -> None:
-        self._builder, self._drawn = GridBuilder(settings), np.empty((0, 3))
+        self._builder, self._drawn, self._drawn_to = GridBuilder(settings), np.empty((0, 3)), 0
 
     def _bring_up_to_date(self) -> None:
-        """Add to the grid the keyframes that it lacks; draw it anew if loops have moved those that it has."""
+        """Add to the grid the scans that it lacks; draw it anew if loops have moved those that it has."""
         poses, settings = self._back.graph.poses, self._builder.settings
         off = pose_difference(poses[: len(self._drawn)], self._drawn)
         if (np.abs(off) > [settings.resolution, settings.resolution, _TURNED]).any():
             self._begin_grid(settings)
-        for node in range(len(self._drawn), len(poses)):
-            if node in self._back.keyframes:
-                self._builder.add(self._back.keyframes[node].scan, poses[node])
-            self._drawn = poses[: node + 1]
+        self._drawn = np.vstack([self._drawn, poses[len(self._drawn) :]])
+        for view in self._back.views:
+            if view.number >= self._drawn_to:
+                self._builder.add(view.scan, compose(self._drawn[view.node], view.tie.pose))
+                self._drawn_to = view.number + 1
 
     def _walls(self, grid: OccupancyGrid) -> Walls:
-        nodes, keyframes = np.array(list(self._back.keyframes)), self._back.keyframes.values()
-        graph, scans = self._back.graph, [keyframe.scan for keyframe in keyframes]
-        poses, covariances = graph.poses[nodes], graph.covariances()[nodes]
-        found = find_walls(scans, poses, covariances, grid, extraction=self._extraction, nodes=nodes)
+        graph, views = self._back.graph, self._back.views
+        nodes, numbers = np.array([(view.node, view.number) for view in views]).T
+        ties = UncertainPose(*(np.array(part) for part in zip(*(view.tie for view in views), strict=True)))
+        placed = UncertainPose(graph.poses[nodes], graph.covariances()[nodes]).compose(ties)
+        scans = [view.scan for view in views]
+        found = find_walls(scans, *placed, grid, extraction=self._extraction, numbers=numbers)
         return self._wall_ids.identified(found)

@@ -11,7 +11,7 @@ from lidarcore.arrays import Array
 from lidarcore.clusters import Clusters
 from lidarcore.errors import MotionError
 from lidarcore.features import Features
-from lidarcore.geometry import UncertainPose, as_pose_covariance, inverse, relative
+from lidarcore.geometry import HERE, UncertainPose, as_pose_covariance, inverse, relative
 from lidarcore.localization import Estimate, Landmarks, Points, TrackingResult, Velocity, as_pose
 from lidarcore.localization.dead_reckoning import DeadReckoning
 from lidarcore.localization.deskewing import Distortion
@@ -29,7 +29,6 @@ from lidarcore.mapping.walls import Walls
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
-_HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 _NONE = Points(np.empty((0, 2)), np.eye(2))
 _NO_LANDMARKS = Landmarks.of(_NONE)
 _PAUSE = 1.0  # s between scans, over which the motion between them does not tell the velocity
@@ -68,7 +67,7 @@ class WholeScans:
         self._background = self._begun()
         # To each keyframe from the one before it, but for those that the map has already, so many.
         self._ways, self._joined = deque[UncertainPose](), 0
-        self._tie = _HERE  # T_keyframe_sensor
+        self._tie = HERE  # T_keyframe_sensor
         self._here: UncertainPose | None = None
         self._before: float | None = None  # stamp of the last scan
         self._velocity: Velocity | None = None
@@ -156,8 +155,8 @@ class WholeScans:
         tie = tracked.tie
         if tracked.keyframe:
             self._ways.append(UncertainPose(tie.pose, tie.covariance + self._settings.drift_covariance))
-            tie = _HERE
-        if tracked.is_news:
+            tie = HERE
+        if tracked.is_news or tracked.view:
             self._background.put(tracked)
         self._tie = tie
         known = self._background.corrected

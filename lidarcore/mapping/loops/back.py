@@ -1,12 +1,13 @@
 """The back end: keyframes become nodes of a pose graph, loops bend it."""
 
+from collections import deque
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import compose, pose_difference, relative, squared_mahalanobis
+from lidarcore.geometry import HERE, compose, pose_difference, relative, squared_mahalanobis
 from lidarcore.mapping.doubt import DOUBTFUL
 from lidarcore.mapping.graph.known import Known, known, known_besides, near_unknown
 from lidarcore.mapping.graph.pose_graph import PoseGraph
@@ -14,7 +15,7 @@ from lidarcore.mapping.graph.refinement import Refined, Step, refine
 from lidarcore.mapping.loops.closure import LoopFinder
 from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.islands import Islands, moved
-from lidarcore.mapping.loops.keyframes import Keyframe
+from lidarcore.mapping.loops.keyframes import Keyframe, View
 from lidarcore.mapping.loops.thinning import spare
 from lidarcore.mapping.matching.odometry_calibration import effects
 from lidarcore.mapping.matching.patches import patches
@@ -25,6 +26,7 @@ from lidarcore.mapping.tracked import Tracked
 
 _AWAY, _TURNED = 0.3, 0.1  # m and rad by which a loop contradicts the finished map
 _FOUND = np.diag([0.05, 0.05, 0.02]) ** 2  # how well it is known where an island was found
+_LATER = 9  # last views from where a sensor stood: as many as a cell takes to become free, see GridSettings
 _SETTLED = 0.01  # m and rad of the last step, after which the poses are far better than that
 
 
@@ -54,15 +56,23 @@ class BackEnd:
         self.loops: list[Loop] = []
         self.keyframes: dict[int, Keyframe] = {}
         self.steps: list[Step] = []
+        self._later: dict[
+            int, deque[View]
+        ] = {}  # than keyframes, of the sensor that stood there, by their nodes
         self._edges: list[int] = []  # of the graph, which tie the same keyframes by what was seen as well
         self._driven: dict[int, _Driven] = {}  # by the number of the step
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
 
     def add(self, tracked: Tracked) -> None:
-        """Append a keyframe, and bend the map if it closes loops; or take the first one anew, if it is told of."""
+        """Append a keyframe, and bend the map if it closes loops; or look again from where the last one was taken.
+
+        The first one is taken anew, if it is told of.
+        """
         if tracked.first is not None:
             self.keyframes[0] = _keyframe(tracked.first)
+        if tracked.view:
+            self._look(tracked)
         if not tracked.keyframe:
             return
         if not self.keyframes:
@@ -85,6 +95,16 @@ class BackEnd:
         nodes = np.array(list(self.keyframes), np.int64)
         for node in spare(nodes, self.graph.poses[nodes]).tolist():
             del self.keyframes[node]
+            self._later.pop(node, None)
+
+    @property
+    def views(self) -> list[View]:
+        """The scans of which grid and walls are made, in the order of time: keyframes, and what was seen there last."""
+        found = []
+        for node, keyframe in self.keyframes.items():
+            found.append(View(keyframe.number, node, HERE, keyframe.scan))
+            found += self._later.get(node, ())
+        return found
 
     def search_again(self) -> int:
         """Look for loops at all keyframes, now that the map is better. Returns how many were closed."""
@@ -98,7 +118,7 @@ class BackEnd:
         scan = without(keyframe.scan, velocity, acceleration)
         if scan is not keyframe.scan:
             seen = patches(scan, self._settings.front.match)
-            self.keyframes[node] = Keyframe(scan, seen, sight(scan), sweep)
+            self.keyframes[node] = Keyframe(keyframe.number, scan, seen, sight(scan), sweep)
 
     def recalibrate(self, errors: Array) -> None:
         """Take out of all steps what odometry does wrong (3,) at each, which was known less well on the way."""
@@ -189,6 +209,10 @@ class BackEnd:
         self._islands.join(found)
         return self._close([loop])
 
+    def _look(self, tracked: Tracked) -> None:
+        later = self._later.setdefault(tracked.node, deque(maxlen=_LATER))
+        later.append(View(tracked.number, tracked.node, tracked.tie, tracked.scan))
+
     def _close(self, loops: list[Loop]) -> int:
         for loop in loops:
             self.graph.connect(loop.i, loop.j, loop.pose, loop.covariance, doubted=True)
@@ -199,7 +223,7 @@ class BackEnd:
 
 
 def _keyframe(tracked: Tracked) -> Keyframe:
-    return Keyframe(tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
+    return Keyframe(tracked.number, tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
 
 
 def _share(tracked: Tracked) -> Array:

@@ -8,12 +8,11 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
-from lidarcore.geometry import UncertainPose, kernels, pose_difference, squared_mahalanobis
+from lidarcore.geometry import HERE, UncertainPose, kernels, pose_difference, squared_mahalanobis
 from lidarcore.mapping.graph.known import JointPoses
 
 # Share of the spread with which a loop was expected, up to which the way around tells whether it is true.
 _TELLING = 0.5
-_HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +63,7 @@ class Consistency:
         return found
 
     def _way(self, i: int, j: int) -> UncertainPose:
-        return _HERE if i == j else self._relative(i, j)
+        return HERE if i == j else self._relative(i, j)
 
 
 def support(loops: Sequence[Loop]) -> float:

@@ -1,19 +1,36 @@
-"""Keyframes: the scans that make the map, with what is matched and compared of them."""
+"""The scans that make a map: keyframes, with what is matched and compared of them, and what was seen there later."""
 
 from typing import NamedTuple
 
-from lidarcore.arrays import Array
+from lidarcore.arrays import Array, Ints
+from lidarcore.geometry import UncertainPose
 from lidarcore.mapping.matching.patches import Patches
 from lidarcore.mapping.matching.sight import Sight
 from lidarcore.scan import Scan
 
 
+class View(NamedTuple):
+    """A scan of which grid and walls are made.
+
+    number  of scans that were placed before it
+    node    of the keyframe that it hangs on, or is
+    tie     T_node_scan with its covariance
+    """
+
+    number: int
+    node: int
+    tie: UncertainPose
+    scan: Scan
+
+
 class Keyframe(NamedTuple):
     """A scan of the map, its patches, and what it saw and looked through.
 
-    sweep  (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
+    number  of scans that were placed before it
+    sweep   (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
     """
 
+    number: int
     scan: Scan
     patches: Patches
     sight: Sight
@@ -21,7 +38,7 @@ class Keyframe(NamedTuple):
 
 
 class Keyframes(NamedTuple):
-    """The scans of a map, where they were taken, and how well that is known.
+    """Scans of a map, where they were taken, and how well that is known.
 
     numbers      (K,) the how-manieth scan each of them was, from 0
     scans        K scans
@@ -29,7 +46,7 @@ class Keyframes(NamedTuple):
     covariances  (K, 3, 3) of the poses, given the first
     """
 
-    numbers: Array
+    numbers: Ints
     scans: tuple[Scan, ...]
     poses: Array
     covariances: Array

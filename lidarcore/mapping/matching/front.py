@@ -6,18 +6,18 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
-from lidarcore.geometry import UncertainPose, relative
+from lidarcore.geometry import HERE, UncertainPose, relative
 from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
 from lidarcore.mapping.matching.odometry_calibration import OdometryCalibration
 from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.persistence import Persistence
 from lidarcore.mapping.matching.registration import Registration
+from lidarcore.mapping.matching.standing import Standing
 from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, elapsed, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
 
-_HERE = UncertainPose(np.zeros(3), np.zeros((3, 3)))
 _FLOOR = np.diag([0.01, 0.01, 0.005]) ** 2  # what a step is never known better than: the search needs room
 _SLOW = 0.1  # weight of the last scan in the usual time between two
 _ROUNDS = 4  # in which the motion in the first two scans is found: what is left of it halves at least
@@ -34,15 +34,16 @@ class FrontEnd:
 
     def __init__(self, settings: FrontSettings) -> None:
         self._settings = settings
-        self._number = 0
+        self._scans = self._number = 0  # number of scans, and of keyframes
         self._map = LocalMap(settings)
-        self._known = self._moved = _HERE  # T_keyframe_scan, and by motion alone
+        self._known = self._moved = HERE  # T_keyframe_scan, and by motion alone
         self._before: tuple[float, Array | None] | None = None  # stamp and odometry
         self._first: Tracked | None = None  # until the second scan
         self._refused = 0  # scans in a row
         self.bridged: MotionError | None = None  # the break before the last scan, over which the map goes on
         self._sweep = Sweep()
         self._wheels = OdometryCalibration()
+        self._standing = Standing(settings)
         self._motion, self._period = Persistence(), 0.0  # s between scans, as stamps of single scans jitter
 
     def step(self, scan: Scan, removed: Array | None = None) -> Tracked:
@@ -69,28 +70,31 @@ class FrontEnd:
         self._known, self._moved, self._before = tie, moved, (scan.stamp, scan.odometry)
         tie = UncertainPose(tie.pose, tie.covariance + self._motion.astray)
         leaves = island or (not is_blind and self._leaves(tie[0], registered.inliers))
+        is_view = on and not leaves and self._standing.is_due(scan.stamp, tie.pose)
         taken = None if wheels is None else self.wheels
         tracked = Tracked(
-            scan.stamp, self._number - 1, tie, moved, taken, on, scan, seen, self._sweep.covariance,
-            self._sweep.removed, leaves, island, first,
+            self._scans, scan.stamp, self._number - 1, tie, moved, taken, on, scan, seen, self._sweep.covariance,
+            self._sweep.removed, leaves, is_view, island, first,
         )  # fmt: skip
+        self._scans += 1
         if leaves:
             if on and wheels is not None:
                 self._wheels.learn(moved, matched)
             if island:
                 self._map.clear()
-            self._begin(seen, tie.pose)
+            self._begin(scan.stamp, seen, tie.pose)
         return tracked
 
     def _begun(self, scan: Scan, removed: Array | None) -> Tracked:
         """The first scan, where the map begins."""
         seen = patches(scan, self._settings.match)
         self._before = scan.stamp, scan.odometry
-        self._begin(seen)
+        self._begin(scan.stamp, seen)
         given = np.zeros(3) if removed is None else removed
         self._first = Tracked(
-            scan.stamp, 0, _HERE, _HERE, None, True, scan, seen, NOTHING, given, True, False
+            0, scan.stamp, 0, HERE, HERE, None, True, scan, seen, NOTHING, given, True, False, False
         )
+        self._scans = 1
         return self._first
 
     def _registered(self, scan: Scan, guess: UncertainPose, dt: float) -> tuple[Scan, Patches, Registration]:
@@ -145,24 +149,25 @@ class FrontEnd:
             straight = replace(
                 first, scan=bare, patches=patches(bare, self._settings.match), velocity=velocity
             )
-            self._begin_anew(straight.patches)
-        self._begin_anew(straight.patches)
+            self._begin_anew(straight)
+        self._begin_anew(straight)
         if straight is not first:
             self._motion.begin(dt * straight.velocity)
             self._sweep.begin(straight.velocity)
         return straight
 
-    def _begin_anew(self, seen: Patches) -> None:
+    def _begin_anew(self, first: Tracked) -> None:
         """The first scan is another one."""
         self._map.clear()
         self._number = 0
-        self._begin(seen)
+        self._begin(first.stamp, first.patches)
 
-    def _begin(self, seen: Patches, tie: Array | None = None) -> None:
+    def _begin(self, stamp: float, seen: Patches, tie: Array | None = None) -> None:
         """The scan is a keyframe, at a pose (3,) from the one before it."""
         self._map.add(seen, tie)
-        self._known = self._moved = _HERE
+        self._known = self._moved = HERE
         self._motion.leave()
+        self._standing.begin(stamp)
         self._number += 1
 
     def _across(self, scan: Scan) -> tuple[float, UncertainPose]:

@@ -1,7 +1,7 @@
 """Observations of walls: by what stretches of segments a wall is told from all others, however the map is bent.
 
-A segment is found in the scan of one keyframe, so its number and where it begins do not change with any pose, nor where
-the map drops other keyframes.
+A segment is found in one scan, so its number and where it begins do not change with any pose, nor where the map drops
+other scans.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from lidarcore.arrays import Array, Columns, Ints
 from lidarcore.mapping.walls.parts import Part
 from lidarcore.mapping.walls.pieces import Pieces
 
-_MOST = 2**20  # segments of one keyframe
+_MOST = 2**20  # segments of one scan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,7 +22,7 @@ class Observations(Columns):
     """N stretches of segments, each seen of one wall.
 
     wall     (N,) which; a segment may have been seen of several, one beside the other
-    segment  (N,) number of the segment: later keyframes have higher ones
+    segment  (N,) number of the segment: later scans have higher ones
     span     (N, 2) m along the segment, from its first end
     """
 
@@ -36,20 +36,20 @@ class Observations(Columns):
         return cls(np.empty(0, np.int64), np.empty(0, np.int64), np.empty((0, 2)))
 
     @classmethod
-    def of(cls, pieces: Pieces, parts: Sequence[Part], nodes: Ints) -> "Observations":
+    def of(cls, pieces: Pieces, parts: Sequence[Part], numbers: Ints) -> "Observations":
         """Observations of walls, by their place in the list: what of each of its segments lies between its ends.
 
-        nodes (K,) are numbers of the keyframes, which stay theirs and rise.
+        numbers (K,) of the scans stay theirs and rise.
         """
         found = [cls.none()]
-        of_keyframe = np.arange(len(pieces)) - np.searchsorted(pieces.keyframe, pieces.keyframe)
-        numbers = nodes[pieces.keyframe] * _MOST + of_keyframe
+        of_scan = np.arange(len(pieces)) - np.searchsorted(pieces.keyframe, pieces.keyframe)
+        segments = numbers[pieces.keyframe] * _MOST + of_scan
         for i, part in enumerate(parts):
             t, _ = part.fit.coordinates(pieces.ends[part.members])
             first = t.min(axis=1, keepdims=True)
             span = np.clip([part.low, part.high], first, t.max(axis=1, keepdims=True)) - first
             on = span[:, 1] > span[:, 0]
-            found.append(cls(np.full(on.sum(), i), numbers[part.members[on]], span[on]))
+            found.append(cls(np.full(on.sum(), i), segments[part.members[on]], span[on]))
         return cls.joined(found)
 
     def renamed(self, names: Ints) -> "Observations":

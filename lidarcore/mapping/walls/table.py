@@ -21,7 +21,7 @@ class WallTable:
     length_variance  (W,) m²
     first_seen       (W,) s
     last_seen        (W,) s
-    count            (W,) number of keyframes that saw it
+    count            (W,) number of scans of the map that saw it
     """
 
     ids: Ints

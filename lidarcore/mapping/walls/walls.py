@@ -72,16 +72,16 @@ def find_walls(
     grid: OccupancyGrid,
     settings: WallSettings | None = None,
     extraction: ExtractionSettings | None = None,
-    nodes: Ints | None = None,
+    numbers: Ints | None = None,
 ) -> Walls:
-    """The walls that keyframes saw and the grid still has, with ids from 0 on.
+    """The walls that scans saw and the grid still has, with ids from 0 on.
 
     scans at poses (K, 3), T_world_sensor; spread says how the poses err together, or is their covariances (K, 3, 3).
-    nodes (K,) are the keyframes' numbers, rising, by which `WallIds` knows them again; by default from 0 on.
+    numbers (K,) of the scans, rising, are those by which `WallIds` knows them again; by default from 0 on.
     """
     settings, extraction = settings or WallSettings(), extraction or ExtractionSettings()
     poses = np.asarray(poses, np.float64).reshape(-1, 3)
-    nodes = np.arange(len(scans)) if nodes is None else nodes
+    numbers = np.arange(len(scans)) if numbers is None else numbers
     pieces = collect_pieces(scans, poses, extraction)
     parts = find_parts(pieces, group_pieces(pieces, settings), grid, settings)
     ends = [(find_end(pieces, part, 0), find_end(pieces, part, 1)) for part in parts]
@@ -115,7 +115,7 @@ def find_walls(
         covariances[:, 2:, 2:],
         _corners(parts, intersections, model),
         model,
-        Observations.of(pieces, parts, nodes),
+        Observations.of(pieces, parts, numbers),
     )
 
 
