@@ -13,10 +13,8 @@ class Standing:
 
     def __init__(self, settings: FrontSettings) -> None:
         self._settings = settings
-        self._since, self._pose = (
-            -np.inf,
-            np.zeros(3),
-        )  # s and T_keyframe_sensor of the last scan that was taken
+        self._since = -np.inf  # s, when a scan was last taken or the sensor moved
+        self._pose = np.zeros(3)  # T_keyframe_sensor then
 
     def begin(self, stamp: float) -> None:
         """A scan is a keyframe: what follows is seen from it."""
