@@ -186,9 +186,14 @@ class Visitor:
         return self
 
     def await_frame(self, frame: dict) -> dict:
-        """Wait until the page shows this frame, which stays."""
+        """Wait until the page shows this frame, which stays, or its scan once more: on a map that was behind."""
+        index = frame["source"]["index"]
         wait_until(
-            lambda: self.readout("frame") == str(frame["sequence"]), "the page shows the frame that stays"
+            lambda: (
+                int(self.readout("frame")) >= frame["sequence"]
+                and self.knows("frame")["source"]["index"] == index
+            ),
+            "the page shows the frame that stays",
         )
         return frame
 

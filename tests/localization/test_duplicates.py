@@ -38,10 +38,12 @@ def test_what_is_far_apart_is_not_merged_for_its_uncertainty_alone() -> None:
     assert find_duplicate(seen_twice(0.5, sigma=1.0), KINDS, BOTH, ONE, SETTINGS) is None
 
 
-def test_a_merged_landmark_lies_where_both_say_together() -> None:
+def test_a_merged_landmark_lies_where_both_say_together_and_tells_nothing_of_the_pose() -> None:
     joint = seen_twice(0.02)
-    middle = joint.landmarks.mean(axis=0)
-    before = joint.landmark_covariances[0]
+    middle, (pose, P) = joint.landmarks.mean(axis=0), (joint.state, joint.state_covariance)
+    before = joint.expected(np.array([0]))[1]
     joint.fuse(0, 1)
     np.testing.assert_allclose(joint.landmarks, [middle], atol=1e-3)
-    assert np.linalg.eigvalsh(before - joint.landmark_covariances[0]).min() > 0
+    np.testing.assert_allclose(joint.expected(np.array([0]))[1], before / 2, rtol=1e-3, atol=1e-9)
+    np.testing.assert_allclose(joint.state, pose, atol=1e-9)
+    np.testing.assert_allclose(joint.state_covariance, P, atol=1e-9)

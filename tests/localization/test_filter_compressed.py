@@ -1,4 +1,4 @@
-"""The compressed filter against the full extended Kalman filter of the textbook, written out here."""
+"""The compressed filter against a full invariant extended Kalman filter, written out here."""
 
 from dataclasses import dataclass
 
@@ -21,10 +21,17 @@ GATE = 20.0
 
 @dataclass
 class Textbook:
-    """[EKF 14-26] on a mean (n,) and a covariance (n, n): the pose, then the landmarks."""
+    """[EKF 14-26] on a mean (n,) and a covariance (n, n): the pose, then the landmarks.
+
+    Errors are e = m - R(theta) m^, theta that of the heading [Barrau and Bonnabel 2015], at the places (n,) of `told`:
+    of what is in reach they are the mean, of other landmarks that at which they went out of reach.
+    """
 
     x: Array
     P: Array
+
+    def __post_init__(self) -> None:
+        self.told = self.x.copy()
 
     def see(self, landmarks: Ints) -> tuple[Array, Array]:
         """Predicted positions (P, 2) in the sensor frame, and their Jacobian (2 P, n)."""
@@ -42,9 +49,9 @@ class Textbook:
     def gated(self, points: Array) -> Ints:
         """Landmarks within the gate of any point."""
         z, H = self.see(np.arange((len(self.x) - 3) // 2))
-        within = []
+        within, P = [], self.carried(np.ones(len(self.x), np.bool_))
         for landmark, (expected, J) in enumerate(zip(z, H.reshape(-1, 2, len(self.x)), strict=True)):
-            information = np.linalg.inv(J @ self.P @ J.T + NOISE)
+            information = np.linalg.inv(J @ P @ J.T + NOISE)
             nu = points - expected
             if (np.einsum("ki,ij,kj->k", nu, information, nu) <= GATE).any():
                 within.append(landmark)
@@ -53,7 +60,7 @@ class Textbook:
     def predict(self, state: Array, F: Array, Q: Array) -> None:
         full = np.eye(len(self.x))
         full[:3, :3] = F
-        self.x[:3] = state
+        self.x[:3] = self.told[:3] = state
         self.P = full @ self.P @ full.T
         self.P[:3, :3] += Q
 
@@ -64,6 +71,18 @@ class Textbook:
         J = np.eye(len(self.x)) - K @ H
         self.P = J @ self.P @ J.T + K @ R @ K.T
 
+    def carried(self, rows: NDArray[np.bool_]) -> Array:
+        """P with errors of these rows (n,) told at their mean."""
+        now = np.where(rows, self.x, self.told)
+        T = np.linalg.inv(to_invariant(now)) @ to_invariant(self.told)
+        return T @ self.P @ T.T
+
+    def carry(self, active: NDArray[np.bool_]) -> None:
+        """Tell the errors of the pose and of active landmarks (L,) at their means."""
+        rows = np.append([True] * 3, np.repeat(active, 2))
+        self.P = self.carried(rows)
+        self.told = np.where(rows, self.x, self.told)
+
     def add(self, point: Array, R: Array) -> None:
         n, (px, py, heading) = len(self.x), self.x[:3]
         c, s = np.cos(heading), np.sin(heading)
@@ -72,25 +91,42 @@ class Textbook:
         G = np.zeros((2, n))
         G[:, :3] = [[1, 0, -dy], [0, 1, dx]]
         self.x = np.append(self.x, [px + dx, py + dy])
+        self.told = np.append(self.told, [px + dx, py + dy])
         self.P = np.block([[self.P, self.P @ G.T], [G @ self.P, G @ self.P @ G.T + turn @ R @ turn.T]])
 
     def keep(self, kept: NDArray[np.bool_]) -> None:
         rows = np.append([True] * 3, np.repeat(kept, 2))
-        self.x, self.P = self.x[rows], self.P[np.ix_(rows, rows)]
+        self.x, self.told, self.P = self.x[rows], self.told[rows], self.P[np.ix_(rows, rows)]
 
     def fuse(self, kept: int, dropped: int, L: int) -> None:
         H = np.zeros((2, len(self.x)))
         H[:, 3 + 2 * kept : 5 + 2 * kept], H[:, 3 + 2 * dropped : 5 + 2 * dropped] = np.eye(2), -np.eye(2)
-        self.correct(H, -H @ self.x, 1e-12 * np.eye(2))
+        dx, dy = H @ self.x
+        H[:, 2] = dy, -dx  # as the sensor sees it: R^T (m_kept - m_dropped) = 0
+        self.correct(H, np.array([-dx, -dy]), 1e-12 * np.eye(2))
         self.keep(np.arange(L) != dropped)
+
+
+def to_invariant(x: Array) -> Array:
+    """Jacobian (n, n) of invariant errors by those of the coordinates, at places x (n,)."""
+    J = np.eye(len(x))
+    for row in [0, *range(3, len(x), 2)]:
+        J[row : row + 2, 2] = [x[row + 1], -x[row]]
+    return J
+
+
+def active(compressed: JointState) -> NDArray[np.bool_]:
+    """Which landmarks (L,) are in reach."""
+    return compressed._rows[compressed._slots] >= 0
 
 
 def assert_equal(compressed: JointState, full: Textbook) -> None:
     L = len(compressed)
-    own = full.P[3:, 3:].reshape(L, 2, L, 2)[np.arange(L), :, np.arange(L)]
+    P = full.carried(np.ones(len(full.x), np.bool_))
+    own = P[3:, 3:].reshape(L, 2, L, 2)[np.arange(L), :, np.arange(L)]
     np.testing.assert_allclose(compressed.state, full.x[:3], atol=1e-9)
     np.testing.assert_allclose(compressed.landmarks.ravel(), full.x[3:], atol=1e-9)
-    np.testing.assert_allclose(compressed.state_covariance, full.P[:3, :3], atol=1e-9)
+    np.testing.assert_allclose(compressed.state_covariance, P[:3, :3], atol=1e-9)
     np.testing.assert_allclose(compressed.landmark_covariances, own, atol=1e-9)
 
 
@@ -132,12 +168,14 @@ def test_the_compressed_filter_is_the_full_filter(
             assert step % 10 or set(full.gated(points)) <= set(near_ones)
             z, H = full.see(order)
             z_compressed, S = compressed.jointly_expected(order, R)
+            full.carry(active(compressed))
             np.testing.assert_allclose(z_compressed, z, atol=1e-9)
             np.testing.assert_allclose(S, H @ full.P @ H.T + np.kron(np.eye(len(seen)), NOISE), atol=1e-9)
             none = np.empty((0, 2), np.int64)
             pairs = Association(np.arange(len(seen)), order, none, none, none[0:0, 0], none[0:0, 0])
             compressed.correct(Innovation(pairs, points - z_compressed, S), R)
             full.correct(H, (points - z).ravel(), np.kron(np.eye(len(seen)), NOISE))
+            full.carry(active(compressed))
         new = [k for k in near.tolist() if k not in names][:3] + ([int(near[0])] if step % 37 == 5 else [])
         if new:
             points = (world[new] - truth[:2]) @ np.array([[c, -s], [s, c]])
@@ -148,8 +186,11 @@ def test_the_compressed_filter_is_the_full_filter(
         twins = [(names.index(k), i) for i, k in enumerate(names) if names.index(k) < i]
         if twins and step % 11 == 0:
             first, dropped = twins[0]
-            compressed.fuse(first, dropped)
+            both = np.isin(np.arange(len(names)), twins[0])
+            full.carry(both)
             full.fuse(first, dropped, len(names))
+            compressed.fuse(first, dropped)
+            full.carry(active(compressed))
             del names[dropped]
         if step % 23 == 0 and len(names) > 20:
             kept_ones = rng.random(len(names)) > 0.05

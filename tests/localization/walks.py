@@ -102,3 +102,15 @@ def nees(error: Array, covariance: Array) -> float:
     """Normalised squared error of a pose (3,)."""
     error = np.array([error[0], error[1], np.angle(np.exp(1j * error[2]))])
     return float(error @ np.linalg.solve(covariance, error))
+
+
+def invariant_error(truth: Array, mean: Array) -> Array:
+    """The motion (3,) m, m, rad of the whole world that takes a pose (3,) to the truth: that of an invariant filter."""
+    return compose(truth, inverse(mean))
+
+
+def invariant_nees(truth: Array, mean: Array, covariance: Array) -> float:
+    """Normalised squared error of a pose (3,), the error told as a motion of the world."""
+    J = np.eye(3)
+    J[:2, 2] = mean[1], -mean[0]
+    return nees(invariant_error(truth, mean), J @ covariance @ J.T)

@@ -1,7 +1,12 @@
 """The joint Gaussian of SLAM: the motion state and two coordinates for each landmark.
 
+Where pose and landmarks lie and head together is never seen. A correction that moves them changes what an error of the
+heading does to each, and a filter that linearises before and after it as if nothing had moved takes the difference for
+knowledge of the heading [Julier and Uhlmann 2001, Huang, Mourikis and Roumeliotis 2010]. So the covariance is carried
+to the new means: the errors are those of an invariant filter [Barrau and Bonnabel 2015].
+
 Only landmarks in reach are active: the cost of a scan is theirs, and that of the others is put off until they come
-into reach. The result is that of the full filter, not an approximation.
+into reach. The result is that of the full filter, not an approximation; others are carried when they come into reach.
 """
 
 import numpy as np
@@ -30,6 +35,7 @@ class JointState:
         self._slots = np.empty(0, np.int64)  # of each landmark, its place among all there ever were
         self._rows = np.empty(0, np.int64)  # of each slot, its row in the active part, or -1
         self._used = np.empty(0, np.int64)  # of each slot, when it was last needed
+        self._left = np.empty((0, 2))  # of each slot, where it became passive: its covariance is told there
         self._coefficients = np.empty(0, np.int64)  # their rows in the active part
         self._free: list[int] = []  # slots of landmarks that were dropped
         self._tick, self._room = 0, _MOST
@@ -55,12 +61,8 @@ class JointState:
     @property
     def landmark_covariances(self) -> Array:
         """(L, 2, 2) m²."""
-        own = self._survey(self._slots)[2]
-        passive = self._rows[self._slots] < 0
-        if passive.any():
-            Psi = -self._active.P[np.ix_(self._coefficients, self._coefficients)]
-            own[passive] = self._passive.covariances(Psi)[self._slots[passive]]
-        return own
+        Psi = -self._active.P[np.ix_(self._coefficients, self._coefficients)]
+        return self._survey(self._slots, self._passive.covariances(Psi))[2]
 
     def predict(self, state: Array, F: Array, Q: Array) -> None:
         """Put the motion state (d,) in place of the old one; F (d, d) is its Jacobian, Q (d, d) the noise."""
@@ -89,7 +91,9 @@ class JointState:
         """Add what the innovation tells, given the noise (P, 2, 2) of its sightings."""
         landmarks = innovation.association.landmark
         z, g = self.expected(landmarks)[0], self._active
+        before = g.x.copy()
         kernels.correct(g.x, g.P, g.n, z, innovation.value, noise, self._rows[self._slots[landmarks]])
+        self._carry(before)
 
     def add(self, points: Array, covariances: Array) -> None:
         """Append landmarks seen at points (K, 2) m with covariances (K, 2, 2), sensor frame."""
@@ -107,18 +111,21 @@ class JointState:
     def fuse(self, kept: int, dropped: int) -> None:
         """Two landmarks are one and the same thing: the first becomes what both say together, the second is forgotten.
 
-        The correction by m_kept - m_dropped = 0, which is linear and holds exactly but for _SAME.
+        The correction by R^T (m_kept - m_dropped) = 0, which holds exactly but for _SAME: told as the sensor sees
+        it, it says nothing of the heading.
         """
         self._activate(self._slots[[kept, dropped]])
         g = self._active
         a, b = self._rows[self._slots[[kept, dropped]], None] + [0, 1]
-        PHt = g.P[: g.n, a] - g.P[: g.n, b]
-        S = PHt[a] - PHt[b] + _SAME**2 * np.eye(2)
-        C = np.linalg.cholesky(S)
+        before, (dx, dy) = g.x.copy(), g.x[a] - g.x[b]
+        turn = np.array([dy, -dx])
+        PHt = g.P[: g.n, a] - g.P[: g.n, b] + g.P[: g.n, [2]] * turn
+        C = np.linalg.cholesky(PHt[a] - PHt[b] + np.outer(turn, PHt[2]) + _SAME**2 * np.eye(2))
         W = np.linalg.solve(C, PHt.T).T
-        g.x[: g.n] += W @ np.linalg.solve(C, g.x[b] - g.x[a])
+        g.x[: g.n] -= W @ np.linalg.solve(C, [dx, dy])
         g.x[2] = wrap(g.x[2])
         g.P[: g.n, : g.n] -= W @ W.T
+        self._carry(before)
         self.keep(np.arange(len(self)) != dropped)
 
     def keep(self, kept: Bools) -> None:
@@ -129,12 +136,19 @@ class JointState:
         self._rows[dropped] = -1
         self._free.extend(dropped.tolist())
 
-    def _survey(self, slots: Ints) -> tuple[Array, Array, Array]:
-        """Means (N, 2), covariances with the pose (N, 3, 2), and at least their own (N, 2, 2); exact if active."""
-        g, far = self._active, self._passive
+    def _survey(self, slots: Ints, passive: Array | None = None) -> tuple[Array, Array, Array]:
+        """Means (N, 2), covariances with the pose (N, 3, 2) and own (N, 2, 2), of passive ones these or at least so."""
+        g, far, own = self._active, self._passive, self._passive.own if passive is None else passive
         return kernels.survey(
-            g.x, g.P, self._rows[slots], slots, self._coefficients, far.x, far.base, far.own
+            g.x, g.P, self._rows[slots], slots, self._coefficients, self._left, far.x, far.base, own
         )
+
+    def _carry(self, before: Array) -> None:
+        """Say the errors of pose and active landmarks where they are now, which were those at means before."""
+        g, rows = self._active, self._rows[self._slots]
+        places = np.concatenate([[0], rows[rows >= 0]])
+        coordinates = places[:, None] + [0, 1]
+        kernels.carry(g.P, g.n, places, g.x[coordinates] - before[coordinates])
 
     def _activate(self, slots: Ints) -> None:
         """Bring landmarks back from the passive part: x = x_0 + B_0^T theta is linear in the coefficients."""
@@ -144,9 +158,11 @@ class JointState:
         g, far, columns, k = self._active, self._passive, _columns(slots), 2 * len(slots)
         rows, T, old = far.recall(columns), far.base[:, columns].T, self._coefficients
         cross = T @ g.P[old, : g.n]
-        first = g.append(far.x[columns] + T @ g.x[old], cross, rows[:, columns] + cross[:, old] @ T.T)
+        xy = far.x[columns] + T @ g.x[old]
+        first = g.append(xy, cross, rows[:, columns] + cross[:, old] @ T.T)
         self._rows[slots] = first + 2 * np.arange(len(slots))
         self._follow(first + np.arange(k))
+        kernels.carry(g.P, g.n, self._rows[slots], xy.reshape(-1, 2) - self._left[slots])
         far.base = np.vstack([far.base, rows])
         self._use(needed)
         self._compress(len(needed))
@@ -171,6 +187,7 @@ class JointState:
         kept = recent[: max(_KEPT, needed)]
         motion = np.arange(self._d)
         columns, rows = _columns(live), (self._rows[live, None] + [0, 1]).ravel()
+        self._left[live] = g.x[rows].reshape(-1, 2)
         passive = np.zeros(len(self._rows), np.bool_)
         passive[self._slots] = self._rows[self._slots] < 0
         far.absorb(
@@ -191,6 +208,7 @@ class JointState:
         self._rows = np.concatenate([self._rows, np.full(new, -1)])
         self._used = np.concatenate([self._used, np.zeros(new, np.int64)])
         self._used[slots] = self._tick
+        self._left = np.concatenate([self._left, np.zeros((new, 2))])
         return slots
 
 

@@ -175,12 +175,31 @@ def correct(x: Array, P: Array, n: int, z: Array, innovation: Array, noise: Arra
 
 
 @kernel
+def carry(P: Array, n: int, rows: Ints, moved: Array) -> None:
+    """Say the errors of places in these rows (K,) at means that have moved by (K, 2) m.
+
+    An error of the heading turns all places about the origin, each by its distance: with u = (-dy, dx) for a place
+    that has moved by (dx, dy), its error is the one it had and u times that of the heading.
+    """
+    u, w = np.zeros(n), P[2, :n].copy()
+    for k in range(len(rows)):
+        u[rows[k]], u[rows[k] + 1] = -moved[k, 1], moved[k, 0]
+    for i in range(n):
+        for j in range(i + 1):
+            if u[i] != 0.0 or u[j] != 0.0:
+                P[i, j] += u[i] * w[j] + w[i] * u[j] + u[i] * u[j] * w[2]
+                P[j, i] = P[i, j]
+
+
+@kernel
 def survey(
-    x: Array, P: Array, rows: Ints, slots: Ints, coefficients: Ints, x_0: Array, base: Array, own_0: Array
-) -> tuple[Array, Array, Array]:
+    x: Array, P: Array, rows: Ints, slots: Ints, coefficients: Ints,
+    left: Array, x_0: Array, base: Array, own_0: Array,
+) -> tuple[Array, Array, Array]:  # fmt: skip
     """Means (N, 2), covariances with the pose (N, 3, 2) and own (N, 2, 2) of landmarks in the rows (N,) of x.
 
-    Where a row is -1, they are those of slots (N,) in the passive part: x_0 + base^T theta and base^T Phi^T.
+    Where a row is -1, they are those of slots (N,) in the passive part: x_0 + base^T theta and base^T Phi^T, carried
+    from where the landmarks were left (S, 2).
     """
     N, n = len(rows), len(x_0)
     xy, cross, own = np.empty((N, 2)), np.empty((N, 3, 2)), np.empty((N, 2, 2))
@@ -197,19 +216,23 @@ def survey(
                 followed[3, j] += theta * entry
     for i in range(N):
         r, s = rows[i], slots[i]
-        for a in range(2):
-            if r >= 0:
+        if r >= 0:
+            for a in range(2):
                 xy[i, a] = x[r + a]
                 for k in range(3):
                     cross[i, k, a] = P[k, r + a]
                 for b in range(2):
                     own[i, a, b] = P[r + a, r + b]
-            else:
-                xy[i, a] = x_0[2 * s + a] + followed[3, 2 * s + a]
-                for k in range(3):
-                    cross[i, k, a] = followed[k, 2 * s + a]
+        else:
+            X = followed[:, 2 * s : 2 * s + 2]
+            for a in range(2):
+                xy[i, a] = x_0[2 * s + a] + X[3, a]
+            u = left[s, 1] - xy[i, 1], xy[i, 0] - left[s, 0]  # as in carry
+            for a in range(2):
                 for b in range(2):
-                    own[i, a, b] = own_0[s, a, b]
+                    own[i, a, b] = own_0[s, a, b] + u[a] * X[2, b] + X[2, a] * u[b] + u[a] * u[b] * P[2, 2]
+                for k in range(3):
+                    cross[i, k, a] = X[k, a] + P[k, 2] * u[a]
     return xy, cross, own
 
 
