@@ -8,10 +8,10 @@ from mapping_scenes import BUILDING, NOISE, full_scan, way
 
 from lidarcore import open_recording
 from lidarcore.evaluation.maps.study import prepared, study
-from lidarcore.geometry import compose, pose_difference
+from lidarcore.geometry import UncertainPose, compose, pose_difference
 from lidarcore.mapping import MapperSettings, MatchSettings, WholeScans
 from lidarcore.mapping.graph.pose_graph import PoseGraph
-from lidarcore.mapping.loops.islands import Islands, moved
+from lidarcore.mapping.loops.islands import Found, Islands, moved
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.sight import sight
@@ -47,7 +47,7 @@ def test_an_island_is_found_where_it_lies_however_wrong_the_graph_has_it(around)
     graph, keyframes, islands, poses = around
     back = poses[60:40:-1] + np.array([0, 0, np.pi])
     ground = len(graph)
-    islands.begin(ground)
+    islands.begin(ground, ground - 1)
     found = None
     for pose in back:
         charted(graph, keyframes, BUILDING, pose[None], compose(WRONG, pose)[None])
@@ -72,10 +72,60 @@ def test_an_island_in_another_building_is_found_nowhere(around):
     graph, keyframes, islands, poses = around
     elsewhere = World(BUILDING.walls * [0.7, 1.4] + [0, 20])
     there = poses[10:34] * [0.7, 1.4, 1] + [0, 20, 0]
-    islands.begin(len(graph))
+    islands.begin(len(graph), len(graph) - 1)
     for pose in there:
         charted(graph, keyframes, elsewhere, pose[None], pose[None])
         assert islands.find(len(graph) - 1) is None
+
+
+def test_what_is_known_on_an_island_does_not_drown_in_how_vaguely_dozens_of_islands_lie():
+    """A robot that is carried elsewhere again and again: on each island two nodes are known to centimetres."""
+    graph, keyframes = PoseGraph(), {}
+    islands = Islands(graph, keyframes)
+    step, known, carried = (
+        np.array([0.5, 0.1, 0.2]),
+        np.diag([0.02, 0.02, 0.01]) ** 2,
+        np.array([40, 30, 2.0]),
+    )
+    for _ in range(60):
+        last = len(graph) - 1
+        shore, tie = islands.shore(last, UncertainPose(carried, np.diag([50.0, 50.0, 7.0]) ** 2))
+        node = graph.add(compose(graph.poses[shore], tie.pose))
+        graph.connect(shore, node, *tie)
+        islands.begin(node, shore)
+        graph.connect(node, graph.add(compose(graph.poses[node], step)), step, known)
+    graph.optimize()
+    assert islands.numbers.max() == 60
+    for node in range(1, len(graph), 2):
+        assert graph.relative(node, node + 1).covariance == pytest.approx(known, rel=0.01, abs=1e-6)
+
+
+def test_an_island_hangs_on_the_node_that_the_island_before_it_hangs_on(around):
+    graph, _, islands, _ = around
+    ground, tie = len(graph) - 1, UncertainPose(np.array([2.0, 1.0, 0.5]), np.diag([0.3, 0.2, 0.6]) ** 2)
+    shore, same = islands.shore(ground, tie)
+    assert (shore, same.pose.tolist()) == (ground, tie.pose.tolist())
+    assert same.covariance == pytest.approx(tie.covariance)
+
+    first = graph.add(compose(graph.poses[ground], tie.pose))
+    graph.connect(ground, first, *tie)
+    islands.begin(first, ground)
+    shore, both = islands.shore(first, tie)
+    assert shore == ground
+    expected = tie.compose(tie)
+    assert both.pose == pytest.approx(expected.pose)
+    assert both.covariance == pytest.approx(expected.covariance)
+    islands.join(Found(first, 0, graph.poses[first]))
+    assert islands.shore(first, tie)[0] == first
+
+
+def test_how_an_island_is_turned_is_never_less_certain_than_any_heading(around):
+    graph, _, islands, _ = around
+    P = np.array([[1.0, 0, 2.0], [0, 1.0, 0], [2.0, 0, 40.0]])
+    _, (_, covariance) = islands.shore(len(graph) - 1, UncertainPose(np.zeros(3), P))
+    assert covariance[2, 2] == pytest.approx(np.pi**2 / 3)
+    assert covariance[:2, :2] == pytest.approx(P[:2, :2])
+    assert np.linalg.eigvalsh(covariance).min() > 0
 
 
 @pytest.mark.long

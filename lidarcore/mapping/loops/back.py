@@ -56,9 +56,7 @@ class BackEnd:
         self.loops: list[Loop] = []
         self.keyframes: dict[int, Keyframe] = {}
         self.steps: list[Step] = []
-        self._later: dict[
-            int, deque[View]
-        ] = {}  # than keyframes, of the sensor that stood there, by their nodes
+        self._later: dict[int, deque[View]] = {}  # of a sensor that still stands, by its keyframe's node
         self._edges: list[int] = []  # of the graph, which tie the same keyframes by what was seen as well
         self._driven: dict[int, _Driven] = {}  # by the number of the step
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
@@ -78,15 +76,19 @@ class BackEnd:
         if not self.keyframes:
             self.keyframes[0] = _keyframe(tracked)
             return
-        pose, P = tracked.tie
-        node = self.graph.add(compose(self.graph.poses[tracked.node], pose))
-        self.keyframes[node] = _keyframe(tracked)
-        self.steps.append(Step(tracked.node, node, *tracked.moved))
-        self._edges.append(self.graph.connect(tracked.node, node, pose, P + self._settings.drift_covariance))
-        if tracked.wheels is not None and not tracked.island:
-            self._driven[len(self.steps) - 1] = _Driven(tracked.wheels, _share(tracked))
+        before, tie, moved = tracked.node, tracked.tie, tracked.moved
         if tracked.island:
-            self._islands.begin(node)
+            before, tie = self._islands.shore(before, tie)
+            moved = tie  # nothing was seen that tells more
+        node = self.graph.add(compose(self.graph.poses[before], tie.pose))
+        self.keyframes[node] = _keyframe(tracked)
+        self.steps.append(Step(before, node, *moved))
+        P = tie.covariance + self._settings.drift_covariance
+        self._edges.append(self.graph.connect(before, node, tie.pose, P))
+        if tracked.island:
+            self._islands.begin(node, before)
+        elif tracked.wheels is not None:
+            self._driven[len(self.steps) - 1] = _Driven(tracked.wheels, _share(tracked))
         self._join(node)
         self._close(self._finder.find(node))
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import compose, inverse, pose_difference, relative
+from lidarcore.geometry import UncertainPose, compose, inverse, pose_difference, relative
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.grid.builder import build_grid
 from lidarcore.mapping.loops.keyframes import Keyframe
@@ -18,6 +18,7 @@ from lidarcore.mapping.relocation import Relocator, query_of
 _TOGETHER = 6  # keyframes that are looked for together, and that an island has at least
 _EVERY = 3  # keyframes: an island is looked for when so many have come since the last time
 _APART = 1.0  # m between two views of an island
+_ANY = np.pi / np.sqrt(3)  # rad, standard deviation of a heading that may be any
 _SAME, _SAME_TURN = 0.3, 0.1  # m and rad within which they say the same
 
 
@@ -35,7 +36,7 @@ class Islands:
     def __init__(self, graph: PoseGraph, keyframes: dict[int, Keyframe]) -> None:
         self._graph, self._keyframes = graph, keyframes
         self._begins: list[tuple[int, int]] = [(0, 0)]  # first node of a stretch, and its island
-        self._count = 1
+        self._shores: list[int] = [0]  # the node on which each island hangs
         self._relocators: dict[int, Relocator] = {}
         self._views: list[Found] = []
 
@@ -46,10 +47,23 @@ class Islands:
         numbers: Ints = islands[np.searchsorted(begins, np.arange(len(self._graph)), side="right") - 1]
         return numbers
 
-    def begin(self, node: int) -> None:
-        """What comes from this node on is an island."""
-        self._begins.append((node, self._count))
-        self._count += 1
+    def shore(self, node: int, tie: UncertainPose) -> tuple[int, UncertainPose]:
+        """On which node an island hangs that comes after `node`, at a tie T_node_island, and T_shore_island.
+
+        That of an island before it, if `node` is on one: hung on each other, some dozens would be so uncertain together
+        that rounding leaves nothing of the relative poses on them.
+        """
+        shore = node
+        if island := int(self.numbers[node]):
+            shore = self._shores[island]
+            tie = self._graph.relative(shore, node).compose(tie)
+        at_most = np.diag([1.0, 1.0, min(1.0, _ANY / np.sqrt(tie.covariance[2, 2]))])
+        return shore, UncertainPose(tie.pose, at_most @ tie.covariance @ at_most)
+
+    def begin(self, node: int, shore: int) -> None:
+        """What comes from this node on is an island that hangs on another node."""
+        self._begins.append((node, len(self._shores)))
+        self._shores.append(shore)
         self._relocators.clear()
         self._views.clear()
 
