@@ -29,29 +29,48 @@ GUESS = UncertainPose(np.zeros(3), np.diag([0.05, 0.05, 0.02]) ** 2)
     ids=["elsewhere by chance", "wheels slip", "as wheels say"],
 )
 def test_what_fits_elsewhere_by_chance_is_not_believed(off, inliers, is_chance):
-    seen = patches(
-        full_scan(furnished_room(), np.array([3.0, 3, 0]), NOISE, np.random.default_rng(1)),
-        SETTINGS.front.match,
-    )
+    scan = full_scan(furnished_room(), np.array([3.0, 3, 0]), NOISE, np.random.default_rng(1))
+    seen = patches(scan, SETTINGS.front.match)
     local = LocalMap(SETTINGS.front)
-    local.add(seen)
+    local.add(scan, seen)
     assert local.is_chance(seen, GUESS, Registration(np.array(off), 1e4 * np.eye(3), inliers)) == is_chance
+
+
+def steps_of_the_front_end(scans, reference):
+    """(T - 1, 3) errors of the steps from scan to scan: m, m, rad."""
+    front, keyframes, poses = FrontEnd(MapperSettings().front), [np.zeros(3)], []
+    for scan in scans:
+        tracked = front.step(scan)
+        poses.append(compose(keyframes[tracked.node], tracked.tie.pose) if poses else np.zeros(3))
+        if tracked.keyframe and len(poses) > 1:
+            keyframes.append(poses[-1])
+    found = np.array(poses)
+    return pose_difference(relative(found[:-1], found[1:]), relative(reference[:-1], reference[1:]))
 
 
 @pytest.mark.real_data
 def test_a_sensor_that_sees_four_metres_of_a_real_building_is_not_turned_round(data):
     """One scan of 440 had matched a quarter of a turn off, 8 standard deviations of what wheels said, by two fifths."""
-    scans, reference = prepared(
-        list(open_recording(data / "carmen_radish_corrected" / "aces-corrected.log.gz")), "poor", 0
-    )
+    log = open_recording(data / "carmen_radish_corrected" / "aces-corrected.log.gz")
+    scans, reference = prepared(list(log), "poor", 0)
     assert reference is not None
-    front, keyframes, poses = FrontEnd(MapperSettings().front), [np.zeros(3)], []
-    for scan in scans:
-        tracked = front.step(replace(scan, ranges=np.where(scan.ranges < 4, scan.ranges, np.nan)))
-        poses.append(compose(keyframes[tracked.node], tracked.tie.pose) if poses else np.zeros(3))
-        if tracked.keyframe and len(poses) > 1:
-            keyframes.append(poses[-1])
-    found = np.array(poses)
-    steps = pose_difference(relative(found[:-1], found[1:]), relative(reference[:-1], reference[1:]))
+    steps = steps_of_the_front_end(
+        [replace(scan, ranges=np.where(scan.ranges < 4, scan.ranges, np.nan)) for scan in scans], reference
+    )
     assert np.hypot(*steps[:, :2].T).max() < 0.5
     assert np.abs(steps[:, 2]).max() < 0.2
+
+
+@pytest.mark.real_data
+@pytest.mark.parametrize("log", ["aces", "intel"])
+def test_a_robot_that_backs_out_of_what_it_has_seen_is_not_held_there(data, log):
+    """A real log read backwards: the sensor sees ahead while the robot drives where it has seen nothing.
+
+    Four fifths of a scan fit a metre off, where the corridor had been seen: that had been believed of 30 scans of 439
+    in one building, of 7 of 909 in the other.
+    """
+    scans = list(open_recording(data / "carmen_radish_corrected" / f"{log}-corrected.log.gz"))
+    last = scans[-1].stamp
+    backwards = [replace(scan, stamp=last - scan.stamp) for scan in reversed(scans)]
+    steps = steps_of_the_front_end(*prepared(backwards, "poor", 0))
+    assert np.hypot(*steps[:, :2].T).max() < 0.5

@@ -11,13 +11,12 @@ from lidarcore.mapping.loops.passes import Passes
 from lidarcore.mapping.matching.correlative import search
 from lidarcore.mapping.matching.patches import Patches
 from lidarcore.mapping.matching.registration import information_of, register
-from lidarcore.mapping.matching.sight import agreement
+from lidarcore.mapping.matching.sight import conflicts
 from lidarcore.mapping.matching.surfels import surfels
 from lidarcore.mapping.settings import LoopSettings, MatchSettings
 
 CAUTION = 4.0
 """A single wrong loop makes the graph surer than it should be: loops are looked for as if it were less sure."""
-_CONFLICT = 0.2  # m by which a point must lie before a surface to contradict it
 # The guess takes part with this many times its covariance, lest it is counted twice in the graph.
 _WIDEN = 9.0
 # A guess from the graph is never taken to be better than this: the search has to move.
@@ -90,10 +89,10 @@ class Hypotheses:
         C = information_of(registered.information) + self._settings.floor
         if gated and squared(registered.pose, mean, C + _cautious(P)) > self._gate:
             return None
-        conflicts = self._conflicts(i, k, registered.pose)
-        if conflicts > self._settings.conflicts:
+        against = conflicts(self._keyframes[i].sight, self._keyframes[k].sight, registered.pose)
+        if against > self._settings.conflicts:
             return None
-        return Loop(i, k, registered.pose, C, registered.inliers - conflicts)
+        return Loop(i, k, registered.pose, C, registered.inliers - against)
 
     def _is_same(self, a: Loop, b: Loop) -> bool:
         """True if two places are one, known only vaguely (along a corridor)."""
@@ -101,15 +100,6 @@ class Hypotheses:
         apart = UncertainPose(relative(poses[a.i], poses[b.i]), np.zeros((3, 3)))
         pose, P = apart.compose(UncertainPose(b.pose, b.covariance))
         return squared(a.pose, pose, a.covariance + P) < self._gate
-
-    def _conflicts(self, i: int, k: int, pose: Array) -> float:
-        """Largest share of either scan that lies where the other one looked through."""
-        a, b = self._keyframes[i].sight, self._keyframes[k].sight
-        there, back = (
-            agreement(a, b, pose, _CONFLICT),
-            agreement(b, a, relative(pose, np.zeros(3)), _CONFLICT),
-        )
-        return max(there[1], back[1])
 
 
 def _cautious(P: Array) -> Array:

@@ -82,14 +82,14 @@ class FrontEnd:
                 self._wheels.learn(moved, matched)
             if island:
                 self._map.clear()
-            self._begin(scan.stamp, seen, tie.pose)
+            self._begin(scan, seen, tie.pose)
         return tracked
 
     def _begun(self, scan: Scan, removed: Array | None) -> Tracked:
         """The first scan, where the map begins."""
         seen = patches(scan, self._settings.match)
         self._before = scan.stamp, scan.odometry
-        self._begin(scan.stamp, seen)
+        self._begin(scan, seen)
         given = np.zeros(3) if removed is None else removed
         self._first = Tracked(
             0, scan.stamp, 0, HERE, HERE, None, True, scan, seen, NOTHING, given, True, False, False
@@ -100,7 +100,7 @@ class FrontEnd:
     def _registered(self, scan: Scan, guess: UncertainPose, dt: float) -> tuple[Scan, Patches, Registration]:
         """The scan on the local map, once more without the motion that it shows there."""
         seen = patches(scan, self._settings.match)
-        registered = self._map.registered(seen, guess)
+        registered = self._map.registered(scan, seen, guess)
         if registered.inliers >= SURE and dt > 0:
             found = relative(self._known.pose, self._map.tie(registered).pose) / dt
             corrected = self._sweep.correct(scan, found, dt)
@@ -138,9 +138,8 @@ class FrontEnd:
         given, velocity = np.zeros(3) if removed is None else removed, first.velocity
         straight = first
         for _ in range(_ROUNDS):
-            registered = self._map.registered(
-                patches(without(scan, velocity - given), self._settings.match), driven
-            )
+            still = without(scan, velocity - given)
+            registered = self._map.registered(still, patches(still, self._settings.match), driven)
             if registered.inliers < SURE:
                 straight = first
                 break
@@ -160,14 +159,14 @@ class FrontEnd:
         """The first scan is another one."""
         self._map.clear()
         self._number = 0
-        self._begin(first.stamp, first.patches)
+        self._begin(first.scan, first.patches)
 
-    def _begin(self, stamp: float, seen: Patches, tie: Array | None = None) -> None:
+    def _begin(self, scan: Scan, seen: Patches, tie: Array | None = None) -> None:
         """The scan is a keyframe, at a pose (3,) from the one before it."""
-        self._map.add(seen, tie)
+        self._map.add(scan, seen, tie)
         self._known = self._moved = HERE
         self._motion.leave()
-        self._standing.begin(stamp)
+        self._standing.begin(scan.stamp)
         self._number += 1
 
     def _across(self, scan: Scan) -> tuple[float, UncertainPose]:

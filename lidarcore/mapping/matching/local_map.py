@@ -10,8 +10,10 @@ from lidarcore.mapping.doubt import DOUBTFUL, evidence, loss
 from lidarcore.mapping.matching.correlative import arm, search
 from lidarcore.mapping.matching.patches import Patches, joined, placed
 from lidarcore.mapping.matching.registration import Registration, information_of, register
+from lidarcore.mapping.matching.sight import conflicts, sight
 from lidarcore.mapping.matching.surfels import Surfels, surfels
 from lidarcore.mapping.settings import FrontSettings
+from lidarcore.scan import Scan
 
 BLIND = 20  # patches: a scan that has fewer fits anywhere
 SURE = 0.6  # share of a scan on the map from which on it needs no search
@@ -29,31 +31,38 @@ class LocalMap:
     def __init__(self, settings: FrontSettings) -> None:
         self._settings = settings
         self._window: deque[Patches] = deque(maxlen=settings.keyframes)  # in the local frame
+        self._scans: deque[tuple[Array, Scan]] = deque(
+            maxlen=settings.keyframes
+        )  # T_local_scan, each with its scan
         self._surfels: Surfels  # of the window
         self._anchor = np.zeros(3)  # T_local_keyframe of the newest
 
     def clear(self) -> None:
         """Forget all keyframes, but not where the last one was."""
         self._window.clear()
+        self._scans.clear()
 
-    def add(self, seen: Patches, tie: Array | None = None) -> None:
+    def add(self, scan: Scan, seen: Patches, tie: Array | None = None) -> None:
         """A keyframe at a pose (3,) from the one before it, or where that is: the map is made anew."""
         if tie is not None:
             self._anchor = compose(self._anchor, tie)
         self._window.append(placed(seen, self._anchor))
+        self._scans.append((self._anchor, scan))
         self._surfels = surfels(joined(self._window), self._settings.match.patch, self._settings.match.reach)
 
-    def registered(self, seen: Patches, guess: UncertainPose) -> Registration:
+    def registered(self, scan: Scan, seen: Patches, guess: UncertainPose) -> Registration:
         """The scan on the local map: from the guess on, and after a search where the guess is vague or does not fit.
 
         Of a scan that lies on the map nearly whole no search could tell a pose that is better by as much as it must be.
+        What a search finds far from the guess must be told by something that was seen against the guess: where a sensor
+        comes to what it has not seen yet, a corridor fits best where it has been seen.
         """
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         prior = information_of(P)
         sigma = np.sqrt(np.diagonal(P))
         near = seen.near.means
         far = arm(near) if len(near) else 0.0
-        registered = register(self._surfels, seen, x, x, prior, match.reach)
+        registered = at_guess = register(self._surfels, seen, x, x, prior, match.reach)
         if len(near) < BLIND:
             return registered
         is_vague = 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE
@@ -61,6 +70,9 @@ class LocalMap:
             registered = self._searched(seen, x, sigma, prior, registered)
         if registered.inliers < SURE:
             registered = self._searched(seen, x, _FURTHER * sigma, prior, registered)
+        is_far = _apart(registered.pose, x) and _contradiction(registered, x, prior) > DOUBTFUL
+        if is_far and not self._refutes(scan, at_guess.pose, registered.pose, len(near)):
+            return at_guess
         return registered
 
     def registered_again(self, seen: Patches, guess: UncertainPose, pose: Array) -> Registration:
@@ -92,10 +104,7 @@ class LocalMap:
         for _ in range(_RIVALS):
             start = search(reference, near, x, sigma, match, besides)
             other = register(self._surfels, seen, start, x, prior, match.reach)
-            off = pose_difference(registered.pose, other.pose)
-            if other.inliers >= _RIVAL * registered.inliers and (
-                np.hypot(*off[:2]) > _WIDE or abs(off[2]) > _TURNED
-            ):
+            if other.inliers >= _RIVAL * registered.inliers and _apart(registered.pose, other.pose):
                 return other.pose
             besides = np.concatenate([besides, start[None]])
         return None
@@ -103,10 +112,22 @@ class LocalMap:
     def is_chance(self, seen: Patches, guess: UncertainPose, registered: Registration) -> bool:
         """Whether a scan that contradicts the guess fits no better than that costs: some of it fits anywhere."""
         x, P = UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
-        off = pose_difference(registered.pose, x)
-        contradiction = float(off @ information_of(P) @ off)
+        contradiction = _contradiction(registered, x, information_of(P))
         worth = evidence(registered.inliers, len(seen.near.means))
         return contradiction > DOUBTFUL and worth < loss(contradiction, DOUBTFUL) / 2
+
+    def _refutes(self, scan: Scan, pose: Array, other: Array, count: int) -> bool:
+        """Whether more of a scan contradicts a pose (3,) than another one, by more than two standard deviations.
+
+        A share is as uncertain as that of so many patches: beams that meet the same surface say the same.
+        """
+        at, there = (self._conflicts(scan, x) for x in (pose, other))
+        return at - there > 2 * float(np.sqrt((at + there) / count))
+
+    def _conflicts(self, scan: Scan, pose: Array) -> float:
+        """Largest share that contradicts a keyframe, if the scan was taken at a pose (3,)."""
+        view = sight(scan)
+        return max(conflicts(sight(other), view, relative(at, pose)) for at, other in self._scans)
 
     def either(self, registered: Registration, rival: Array) -> UncertainPose:
         """The pose seen from the keyframe, so uncertain that it may be the rival."""
@@ -122,5 +143,16 @@ class LocalMap:
 
 def _worth(registered: Registration, n: int, guess: Array, prior: Array) -> float:
     """Log-likelihood of a pose: a patch of the n for each that fits, as in the search, less how far the guess is."""
+    return n * registered.inliers - loss(_contradiction(registered, guess, prior), DOUBTFUL) / 2
+
+
+def _contradiction(registered: Registration, guess: Array, prior: Array) -> float:
+    """Squared Mahalanobis distance of a pose from the guess (3,), which has the information prior (3, 3)."""
     off = pose_difference(registered.pose, guess)
-    return n * registered.inliers - loss(float(off @ prior @ off), DOUBTFUL) / 2
+    return float(off @ prior @ off)
+
+
+def _apart(a: Array, b: Array) -> bool:
+    """Whether two poses (3,) are not the same."""
+    x, y, turn = pose_difference(a, b)
+    return bool(np.hypot(x, y) > _WIDE or abs(turn) > _TURNED)

@@ -6,13 +6,14 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
-from lidarcore.geometry import wrap
+from lidarcore.geometry import relative, wrap
 from lidarcore.geometry.kernels import rotate
 from lidarcore.scan import Scan
 
 # Between returns farther apart than both nothing was seen.
 _APART = 0.1  # rad
 _BEAMS = 2.0  # times the spacing of beams
+_CONFLICT = 0.2  # m by which a point must lie before a surface to contradict it
 
 
 class Sight(NamedTuple):
@@ -62,3 +63,9 @@ def agreement(reference: Sight, scan: Sight, pose: Array, margin: float) -> tupl
         elif rho < far + slack:
             seen += 1
     return seen / max(N, 1), nearer / max(N, 1)
+
+
+def conflicts(a: Sight, b: Sight, pose: Array) -> float:
+    """Largest share of either scan that lies where the other one looked through, at T_a_b (3,)."""
+    there, back = agreement(a, b, pose, _CONFLICT), agreement(b, a, relative(pose, np.zeros(3)), _CONFLICT)
+    return max(there[1], back[1])
