@@ -1,5 +1,7 @@
 """Patches, surfels and how a scan is registered on them, against known motion, brute force and finite differences."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from mapping_scenes import NOISE, full_scan, sick_scan
@@ -8,7 +10,7 @@ from scipy.spatial import cKDTree
 from lidarcore import Scan
 from lidarcore.geometry import act, act_inverse, compose, pose_difference, relative, rotate
 from lidarcore.mapping import MatchSettings
-from lidarcore.mapping.matching.correlative import search
+from lidarcore.mapping.matching.correlative import candidates, search
 from lidarcore.mapping.matching.patches import joined, patches, placed
 from lidarcore.mapping.matching.registration import linearised, register
 from lidarcore.mapping.matching.surfels import nearest, surfels
@@ -119,9 +121,16 @@ def test_the_search_finds_the_best_pose_of_its_window_and_the_best_one_besides()
         for turn in found[2] + (guess[2] - found[2]) * np.arange(-3, 4) / 3
     )
     assert _score(reference, points, found, found[2], guess, sigma, settings) >= best - 1e-3
-    other = search(reference, points, guess, 5 * sigma, settings, found[None])
-    away = relative(found, other)
-    assert np.hypot(*away[:2]) > 0.4 or abs(away[2]) > 0.24
+
+    def besides(others):
+        return candidates(reference, points, guess, 5 * sigma, settings, others)
+
+    rest = list(islice(besides(found[None]), 4))
+    for k, other in enumerate(rest):
+        before = np.array([found, *rest[:k]])
+        away = relative(before, other)
+        assert ((np.hypot(*away[:, :2].T) > 0.4) | (abs(away[:, 2]) > 0.24)).all()
+        assert other == pytest.approx(next(besides(before)))  # as if looked for alone
 
 
 @pytest.mark.parametrize("turn", [0.0, np.pi / 2])

@@ -1,5 +1,7 @@
 """Where a node may be, seen from an earlier one: what was seen around both is registered on each other."""
 
+from itertools import islice
+
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
@@ -8,7 +10,7 @@ from lidarcore.mapping.graph.known import JointPoses
 from lidarcore.mapping.loops.consistency import Loop, spread, squared
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.loops.passes import Passes
-from lidarcore.mapping.matching.correlative import search
+from lidarcore.mapping.matching.correlative import candidates
 from lidarcore.mapping.matching.patches import Patches
 from lidarcore.mapping.matching.registration import information_of, register
 from lidarcore.mapping.matching.sight import conflicts
@@ -69,11 +71,8 @@ class Hypotheses:
         """
         reference = self._passes.seen(i, nodes).means
         mean, sigma = relative(self._graph.poses[i], self._graph.poses[k]), np.sqrt(np.diagonal(P))
-        starts = np.empty((0, 3))
-        for _ in range(min(room, _PLACES)):
-            start = search(reference, seen.means, mean, sigma, self._match, starts)
-            starts = np.concatenate([starts, start[None]])
-        return starts
+        found = candidates(reference, seen.means, mean, sigma, self._match)
+        return np.array(list(islice(found, min(room, _PLACES))))
 
     def _tied(self, i: int, k: int, place: Array, seen: Patches, gated: bool) -> Loop | None:
         """Node k, taken to be at a place (3,), registered on what was seen around node i; None if it does not fit."""

@@ -4,6 +4,7 @@ The reference is a grid of scores. Blocks of shifts are judged at once on a grid
 never underrates them, and only blocks that may hold the best shift are looked into.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -32,54 +33,66 @@ class _Window(NamedTuple):
     half    (2,) blocks to either side
     turns   (T,) rad
     sigma   (3,) standard deviations of the guess
-    others  (E, 3) shifts and turns of poses that are left out, with all within `close`, cells and rad (2,)
+    close   (2,) cells and rad within which two poses are one
     """
 
     guess: Array
     half: Ints
     turns: Array
     sigma: Array
-    others: Array
     close: Array
 
 
-def search(
+def search(reference: Array, points: Array, guess: Array, sigma: Array, settings: MatchSettings) -> Array:
+    """T_reference_sensor (3,) at which points (N, 2) m fit the reference points (M, 2) m best.
+
+    Looks three standard deviations sigma (3,) around the guess (3,), up to the settings' limits; where several
+    poses fit alike (along a corridor), the one nearest to the guess wins. The guess itself if no point is near.
+    """
+    return next(candidates(reference, points, guess, sigma, settings))
+
+
+def candidates(
     reference: Array,
     points: Array,
     guess: Array,
     sigma: Array,
     settings: MatchSettings,
     besides: Array = _NO_POSES,
-) -> Array:
-    """T_reference_sensor (3,) at which points (N, 2) m fit the reference points (M, 2) m best.
+) -> Iterator[Array]:
+    """The best pose (3,) that `search` finds, then the best one that is not close to it, and so on.
 
-    Looks three standard deviations sigma (3,) around the guess (3,), up to the settings' limits; where several
-    poses fit alike (along a corridor), the one nearest to the guess wins. The guess itself if no point is near.
-    Poses close to those of `besides` (E, 3) are left out: what else might it be?
+    None is close to a pose of `besides` (E, 3) either: what else might it be?
     """
     most = np.minimum(_REACH * sigma, [settings.max_shift, settings.max_shift, settings.max_turn])
     cell = settings.cell * (2 if most[:2].max() > _WIDE else 1)
     if not len(points):
-        return guess
+        yield guess
+        return
     ranges = np.hypot(*points.T)
     horizon = max(settings.horizon, float(np.median(ranges)))
     near = points[ranges <= horizon]
     near = near[:: max(1, len(near) // _ENOUGH)]
     kept = reference[np.hypot(*(reference - guess[:2]).T) < horizon + most[:2].max()]
     if not len(kept):
-        return guess
+        yield guess
+        return
     low, fine = _grid(kept, cell, max(settings.blur, cell))
-    far = max(1.0, arm(near))
-    step = cell / far  # rad that move far points by one cell
+    step = cell / max(1.0, arm(near))  # rad that move far points by one cell
     turns = step * np.arange(-np.floor(most[2] / step), np.floor(most[2] / step) + 1)
     half = np.ceil(most[:2] / cell / _BLOCK).astype(np.int64)
     unit = np.array([cell, cell, 1.0])
-    others = (besides - guess) / unit
-    others[:, 2] = wrap(others[:, 2])
     centre = np.array([*(guess[:2] - low) / cell, guess[2]])
-    window = _Window(centre, half, turns, sigma / unit, others, np.array([_CLOSE / cell, _CLOSE_TURN]))
-    found: Array = guess + np.array(_search(fine, _blocks(fine), near / cell, window)) * unit
-    return found
+    window = _Window(centre, half, turns, sigma / unit, np.array([_CLOSE / cell, _CLOSE_TURN]))
+    cells = _cells(near / cell, window)
+    bounds = _bounds(_blocks(fine), cells, window)
+    order, known = np.argsort(-bounds, axis=None), bounds.copy()
+    while True:
+        others = (besides - guess) / unit
+        others[:, 2] = wrap(others[:, 2])
+        found: Array = guess + np.array(_search(fine, cells, bounds, known, order, others, window)) * unit
+        yield found
+        besides = np.concatenate([besides, found[None]])
 
 
 @kernel
@@ -133,24 +146,31 @@ def _blocks(fine: Array) -> Array:
 
 
 @kernel
-def _search(fine: Array, blocks: Array, points: Array, window: _Window) -> tuple[float, float, float]:
-    """Best shift, in cells, and turn: the bounds of all blocks first, then the blocks from the best bound on."""
-    turns, half = window.turns, window.half
-    cells = _cells(points, window)
-    bounds = _bounds(blocks, cells, window)
-    flat, scores = bounds.ravel(), np.empty((_BLOCK, _BLOCK))
+def _search(
+    fine: Array, cells: Ints, bounds: Array, known: Array, order: Ints, others: Array, window: _Window
+) -> tuple[float, float, float]:
+    """Best shift, in cells, and turn that is not close to one of others (E, 3): looks into blocks in the order given.
+
+    Blocks that were looked into are known better than by their bounds afterwards.
+    """
+    turns, half, scores = window.turns, window.half, np.empty((_BLOCK, _BLOCK))
+    flat, limits = bounds.ravel(), known.ravel()
     best, best_u, best_v, best_turn = -np.inf, 0, 0, 0.0
-    for n in np.argsort(-flat):
+    for n in order:
         if flat[n] <= best:
             break
+        if limits[n] <= best:
+            continue
         t, block = divmod(n, bounds.shape[1] * bounds.shape[2])
         a, b = divmod(block, bounds.shape[2])
         u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
         _sum_scores(fine, cells[t], u, v, scores)
+        limits[n] = -np.inf
         for du in range(u, u + _BLOCK):
             for dv in range(v, v + _BLOCK):
                 total = scores[du - u, dv - v] - _penalty(du, dv, turns[t], window.sigma)
-                if total > best and not _close(window, du, dv, turns[t]):
+                limits[n] = max(limits[n], total)
+                if total > best and not _is_close(others, window.close, du, dv, turns[t]):
                     best, best_u, best_v, best_turn = total, du, dv, turns[t]
     return best_u, best_v, best_turn
 
@@ -200,9 +220,8 @@ def _sum_scores(fine: Array, cells: Ints, u: int, v: int, scores: Array) -> None
 
 
 @kernel
-def _close(window: _Window, du: float, dv: float, turn: float) -> bool:
+def _is_close(others: Array, close: Array, du: float, dv: float, turn: float) -> bool:
     """True if a shift in cells and a turn are those of another pose."""
-    others, close = window.others, window.close
     for k in range(len(others)):
         away = (others[k, 0] - du) ** 2 + (others[k, 1] - dv) ** 2
         if away < close[0] * close[0] and abs(others[k, 2] - turn) < close[1]:

@@ -1,13 +1,14 @@
 """The surfaces of the last keyframes, and where a scan lies on them."""
 
 from collections import deque
+from itertools import islice
 
 import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, compose, pose_difference, relative
 from lidarcore.mapping.doubt import DOUBTFUL, evidence, loss
-from lidarcore.mapping.matching.correlative import arm, search
+from lidarcore.mapping.matching.correlative import arm, candidates, search
 from lidarcore.mapping.matching.patches import Patches, joined, placed
 from lidarcore.mapping.matching.registration import Registration, information_of, register
 from lidarcore.mapping.matching.sight import conflicts, sight
@@ -101,12 +102,10 @@ class LocalMap:
         sigma, prior, besides = np.sqrt(np.diagonal(P)), information_of(P), registered.pose[None]
         if 3 * np.hypot(sigma[0], sigma[1]) < _WIDE:
             return None
-        for _ in range(_RIVALS):
-            start = search(reference, near, x, sigma, match, besides)
+        for start in islice(candidates(reference, near, x, sigma, match, besides), _RIVALS):
             other = register(self._surfels, seen, start, x, prior, match.reach)
             if other.inliers >= _RIVAL * registered.inliers and _apart(registered.pose, other.pose):
                 return other.pose
-            besides = np.concatenate([besides, start[None]])
         return None
 
     def is_chance(self, seen: Patches, guess: UncertainPose, registered: Registration) -> bool:
