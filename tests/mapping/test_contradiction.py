@@ -58,7 +58,7 @@ def colonnade(period):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_robot_that_backs_out_between_walls_that_repeat_is_not_held_where_it_has_seen_them(seed):
-    """At each scan a third is new: one period on, all of it would fit what was seen, 18 deviations from the wheels."""
+    """Most of each scan is new: one period on, all of it would fit what was seen, against what the wheels say."""
     x = np.arange(40, 10, -1.8)
     poses = np.stack([x, 0 * x, 0 * x], -1)
     scans = drive(poses, np.random.default_rng(seed), world=colonnade(2.0))
