@@ -13,7 +13,7 @@ from waiting import wait_until
 from lidarcore import open_recording
 from lidarcore.errors import CovarianceError, LocalizationError
 from lidarcore.evaluation.maps.accuracy import reference_poses
-from lidarcore.geometry import compose, pose_difference, relative, squared_mahalanobis
+from lidarcore.geometry import act, compose, pose_difference, relative, squared_mahalanobis
 from lidarcore.localization import TrackingResult
 from lidarcore.mapping import MapPicture, WholeScans
 from lidarcore.mapping.grid import OccupancyGrid, build_grid
@@ -23,7 +23,7 @@ from lidarcore.mapping.settings import MapperSettings
 from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
 from lidarcore.settings import ExtractionSettings
-from lidarcore.simulation import SimulatedSensor, rooms
+from lidarcore.simulation import SimulatedSensor, World, rooms
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 
@@ -138,6 +138,27 @@ def test_where_two_places_look_alike_a_person_can_say_which() -> None:
         results = followed(tracker, scans[10:])
     assert {one.state for one in results} == {"tracking"}
     assert np.abs(errors(results, scans[10:])).max() < 0.08
+
+
+def test_a_sensor_that_stands_is_found_once_nobody_stands_before_what_tells_where_it_is() -> None:
+    """The room looks the same from either end, but for a closet in one corner; it stands 0.2 m from its keyframe."""
+    room, rng, here = rooms.rectangular_room(6, 4), np.random.default_rng(1), np.array([0.5, 0.4, 0.3])
+    closet = np.array([[[2.2, -2.0], [2.2, -1.0]], [[2.2, -1.0], [3.0, -1.0]]])
+    sensor = SimulatedSensor(World(np.concatenate([room.walls, closet])), SETTINGS.noise)
+    poses = np.array([[x, 0.3, 0.2] for x in np.linspace(-1.5, 1.5, 16)])
+    picture = MapPicture(build_grid([sensor.scan(pose, rng)[0] for pose in poses], poses))
+    results = []
+    with closing(WholeScans(SETTINGS, known=picture, background=False)) as tracker:
+        for k in range(24):
+            pose = here if k else compose(here, np.array([-0.2, 0.0, 0.0]))
+            scan = replace(sensor.scan(pose, rng)[0], stamp=0.5 * k)
+            x, y = act(pose, scan.xy).T
+            hidden = (x > 2) & (y < -0.7) & (k < 10)
+            results.append(tracker.step(replace(scan, ranges=np.where(hidden, 0.5, scan.ranges))))
+    assert {one.state for one in results[:10]} == {"starting"}
+    assert "several places" in (results[9].message or "")
+    assert results[-1].state == "coasting"
+    assert np.abs(pose_difference(results[-1].estimate.pose, here)).max() < 0.03
 
 
 def test_of_a_long_drive_the_newest_part_of_the_path_is_kept(

@@ -17,7 +17,7 @@ from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
 from lidarcore.threads import FailureLog
 
-_TOGETHER = 6  # keyframes that are looked for together
+_TOGETHER = 6  # scans that are looked for together
 _MISSES = 3  # keyframes in a row that the map contradicts, after which the pose is not believed
 _PATH = 10_000  # keyframes of which is kept where they lie: some kilometres
 _LOST = 1.0  # m of standard deviation beyond which a predicted pose is none
@@ -36,6 +36,8 @@ _WHY_NOT: dict[Verdict, str] = {
 
 class LocateWorker(Background):
     """Takes keyframes and says where they lie in a map that is known.
+
+    A sensor that stands and was not found is looked for again with each view: who stood in front of it may have left.
 
     A pose is believed once a search of the whole map has one answer, and the map still agrees a metre further on: where
     rooms look alike and one of them is not in the map, a single view is mistaken for the other. From there on it is
@@ -56,7 +58,7 @@ class LocateWorker(Background):
         self._relocator: Relocator | None = None
         self._here, self._local = _NOWHERE, np.zeros(3)  # T_map_keyframe, T_local_keyframe
         self._keyframes, self._poses = 0, deque[Array](maxlen=_PATH)
-        self._recent: deque[tuple[Scan, Array]] = deque(maxlen=_TOGETHER)  # and T_local_keyframe
+        self._recent: deque[tuple[Scan, Array]] = deque(maxlen=_TOGETHER)  # and T_local_scan
         self._verdict: tuple[State, str | None] = "starting", None
         self._misses = 0
         self._begin, self._is_confirmed = self._local, False  # where the pose was found
@@ -88,6 +90,8 @@ class LocateWorker(Background):
             self._verdict = "coasting", _NOT_SEEN
         elif item.is_news:
             self._go_on(item)
+        elif self._verdict[0] in ("starting", "lost"):
+            self._look_again(item)
         else:  # a sensor that stands sees what it has seen
             return
         if self._recent:
@@ -112,6 +116,12 @@ class LocateWorker(Background):
         self._poses.append(self._here.pose)
         self._keyframes += 1
 
+    def _look_again(self, view: Tracked) -> None:
+        """Take a view from where the sensor stands in place of the one before it."""
+        if self._recent:
+            self._recent.pop()
+        self._recent.append((view.scan, compose(self._local, view.tie.pose)))
+
     def _look(self, waiting: int) -> None:
         """Compare the last keyframes with the map: near the pose if there is one, else everywhere."""
         if self._relocator is None:
@@ -128,15 +138,16 @@ class LocateWorker(Background):
                 self._verdict = state, _WHY_NOT[found.verdict]
 
     def _found(self, find: Callable[[Query], Relocation]) -> Relocation:
-        """What a search finds by the last keyframes together, or by the last one alone where those fit nowhere.
+        """Where the last scans together, or the last one alone where those fit nowhere, say that the keyframe lies.
 
-        Together they see more walls, but also whoever walks about in as many places as there are keyframes.
+        Together they see more walls, but also whoever walks about in as many places as there are scans.
         """
-        scans, poses = zip(*self._recent, strict=True)
-        together = find(query_of(scans, np.array(poses)))
+        scans, at = zip(*self._recent, strict=True)
+        poses = np.array(at)
+        together = find(query_of(scans, poses, self._local))
         if together.verdict != "no fit" or len(scans) == 1:
             return together
-        alone = find(query_of(scans[-1:]))
+        alone = find(query_of(scans[-1:], poses[-1:], self._local))
         return alone if alone.found else together
 
     def _follow(self, near: Relocation, relocator: Relocator) -> None:

@@ -80,7 +80,7 @@ class Relocator:
         self._field = make_field(self._grid, self.settings.reach)
 
     def find(self, query: Query) -> Relocation:
-        """Where the last scan of a query was taken."""
+        """Where the pose that a query looks for is."""
         if len(query.points) < self.settings.least_points:
             return _nowhere("too few points")
         height, width = self._field.room.shape[1:]
@@ -91,7 +91,7 @@ class Relocator:
         return found or _nowhere("no fit")
 
     def find_near(self, query: Query, guess: UncertainPose) -> Relocation:
-        """Where the last scan of a query was taken, within three standard deviations of a guess T_world_sensor.
+        """Where the pose that a query looks for is, within three standard deviations of a guess T_world_sensor.
 
         If it is not found there, the answer says how well the guess itself fits. Only places near the guess are
         rivals.
