@@ -219,6 +219,7 @@ class Navigation:
         """The run that this scan belongs to; a new one where the old one does not lead to it."""
         run, wanted = self._run, settings.navigation
         if run and run.is_continued_by(timed, wanted):
+            run.renew(settings.extraction)
             return run
         if run and wanted.mode == "localize":
             run.close()  # its map may be the one to localize in

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
-from lidarcore import Array, Features, Scan
+from lidarcore import Array, ExtractionSettings, Features, Scan
 from lidarcore.clusters import Clusters
 from lidarcore.localization import Landmarks, NavigationSettings, Navigator, TrackingResult, Velocity, deskew
 from lidarcore.mapping import MapPicture, WholeScans
@@ -82,6 +82,11 @@ class Run:
         if self.known is not None or not isinstance(self.navigator, WholeScans):
             return paths
         return replace(paths, estimated=thinned(self.navigator.path()))
+
+    def renew(self, extraction: ExtractionSettings) -> None:
+        """Go on with what was set meanwhile; landmarks come as they were extracted."""
+        if isinstance(self.navigator, WholeScans):
+            self.navigator.renew(extraction)
 
     def end(self) -> None:
         """Let what runs in the background end; returns at once."""

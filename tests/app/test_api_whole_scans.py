@@ -141,7 +141,10 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
 
 
 def test_what_the_map_makes_of_the_last_scans_is_shown_when_no_further_one_comes(server: Server) -> None:
-    """Walls are sought behind the scans: where a recording has ended, a page has those that REST tells."""
+    """Walls are sought behind the scans: where a recording has ended, a page has those that REST tells.
+
+    A noise that is set then is that of its walls.
+    """
     scans = list(islice(SimulatedRobot(SimulationSettings(world="furnished room", seed=3)), 150))
     np.savez(
         server.folder / "drive.npz",
@@ -163,3 +166,11 @@ def test_what_the_map_makes_of_the_last_scans_is_shown_when_no_further_one_comes
         wait_until(lambda: last - 1 < last_seen() <= last, "the walls know the last scans")
         stream.until("walls", lambda told: told["walls"] == server.get("/walls")["walls"])
     assert server.get("/source")["state"] == "ended"
+
+    def best_known() -> float:
+        """m² of the length that is known best."""
+        return min(wall["length_variance"] for wall in server.get("/walls")["walls"])
+
+    before = best_known()
+    server.change("PATCH", "/settings", {"extraction": {"noise": {"sigma_range": 0.1}}})
+    wait_until(lambda: best_known() > 4 * before, "the walls are as noisy as was set")

@@ -13,7 +13,10 @@ from waiting import wait_until
 from lidarcore.geometry import relative, wrap
 from lidarcore.localization import TrackingResult
 from lidarcore.mapping import WholeScans
+from lidarcore.mapping.walls import WallTable
+from lidarcore.noise import SensorNoise
 from lidarcore.scan import Array, Scan
+from lidarcore.settings import ExtractionSettings
 from lidarcore.simulation import SimulatedSensor, furnished_room
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
@@ -121,6 +124,27 @@ def test_walls_catch_up_when_no_more_scans_come(slam: WholeScans, drive: list[Sc
         return walls is not None and bool(walls.last_seen.max() >= drive[130].stamp)
 
     wait_until(is_complete)
+
+
+def test_a_noise_that_is_set_on_the_way_is_that_of_poses_and_walls_from_then_on(
+    slam: WholeScans, drive: list[Scan]
+) -> None:
+    def found() -> WallTable | None:
+        return slam.picture.walls if slam.picture else None
+
+    def longest(walls: WallTable | None) -> float:
+        """m² of how far from the map's origin it is."""
+        assert walls is not None
+        return float(walls.line_covariance[np.argmax(walls.length), 1, 1])
+
+    pose = followed(slam, drive[:4])[-1].estimate.covariance
+    wait_until(lambda: found() is not None and not slam.is_behind)
+    walls = found()
+    slam.renew(ExtractionSettings(noise=SensorNoise(0.1, 0.001)))  # ten times that of the simulation
+    wait_until(lambda: found() is not walls)
+    assert longest(found()) > 4 * longest(walls)
+    noisier = followed(slam, drive[4:5])[-1].estimate.covariance
+    assert (np.diagonal(noisier) > 2 * np.diagonal(pose)).all()
 
 
 def test_what_is_kept_at_the_end_knows_the_last_scans(drive: list[Scan]) -> None:

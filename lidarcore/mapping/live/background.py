@@ -11,6 +11,7 @@ from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.live.worker import Worker
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import Walls
+from lidarcore.settings import ExtractionSettings
 
 END_WITHIN = 5.0  # s that a thread may take for what it is at
 
@@ -56,8 +57,8 @@ class Background(ABC):
         """Whether keyframes wait."""
         return self._worker is not None and self._worker.is_behind
 
-    def put(self, item: Tracked | UncertainPose) -> None:
-        """Go on by a keyframe; returns at once, or raises what goes wrong where there is no thread."""
+    def put(self, item: Tracked | UncertainPose | ExtractionSettings) -> None:
+        """Go on by a keyframe, or by what was told; returns at once, or, without a thread, raises what goes wrong."""
         if self._worker is None:
             self._step(item, 0)
         else:
@@ -66,6 +67,10 @@ class Background(ABC):
     @abstractmethod
     def place(self, T_map_keyframe: UncertainPose) -> None:
         """Go on from a pose of the last keyframe that someone has told. Raises LocalizationError."""
+
+    @abstractmethod
+    def renew(self, extraction: ExtractionSettings) -> None:
+        """Find walls so from here on; returns at once."""
 
     @abstractmethod
     def judge(self, tracked: Tracked, here: UncertainPose) -> tuple[State, str | None]:

@@ -15,6 +15,7 @@ from lidarcore.mapping.relocation import Query, Relocation, Relocator, Verdict, 
 from lidarcore.mapping.settings import VAGUE
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
+from lidarcore.settings import ExtractionSettings
 from lidarcore.threads import FailureLog
 
 _TOGETHER = 6  # scans that are looked for together
@@ -68,6 +69,9 @@ class LocateWorker(Background):
     def place(self, T_map_keyframe: UncertainPose) -> None:
         """Go on from a pose of the last keyframe, or of the first one to come, that someone has told."""
         self.put(T_map_keyframe)
+
+    def renew(self, extraction: ExtractionSettings) -> None:
+        """A known map finds no walls."""
 
     def judge(self, tracked: Tracked, here: UncertainPose) -> tuple[State, str | None]:
         """Whether the pose of a scan is to be believed, and what is to be said about that."""

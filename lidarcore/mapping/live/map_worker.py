@@ -63,19 +63,25 @@ class MapWorker(Background):
         """Raises LocalizationError: the map begins at its first scan, and cannot be moved."""
         raise LocalizationError(_NOT_PLACED)
 
+    def renew(self, extraction: ExtractionSettings) -> None:
+        """Find walls so from here on, also those of the scans that the map has."""
+        self.put(extraction)
+
     def judge(self, tracked: Tracked, here: UncertainPose) -> tuple[State, str | None]:
         """Lost where the scan lies on nothing known, or the sensor may be in several places."""
         if here.covariance[2, 2] > VAGUE**2:
             return "lost", _ISLAND
         return ("tracking", None) if tracked.on else ("lost", _NOT_CONNECTED)
 
-    def _work(self, tracked: Tracked | None, waiting: int) -> None:
+    def _work(self, item: Tracked | ExtractionSettings | None, waiting: int) -> None:
         with self._failures():
-            self._step(tracked, waiting)
+            self._step(item, waiting)
 
-    def _step(self, tracked: Tracked | None, waiting: int) -> None:
-        if tracked is not None:
-            self._add(tracked)
+    def _step(self, item: Tracked | ExtractionSettings | None, waiting: int) -> None:
+        if isinstance(item, ExtractionSettings):
+            self._extraction, self._walled = item, 0
+        elif item is not None:
+            self._add(item)
         now = time.monotonic()
         lacks = self._drawn_to < self._known or self._lacks_walls(now)
         if lacks and now >= self._next_picture:

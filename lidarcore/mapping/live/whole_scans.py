@@ -58,8 +58,8 @@ class WholeScans:
         background: bool = True,
     ) -> None:
         self._begin_map, self._known, self._in_background = begin_map, known, background
-        self._extraction = extraction = extraction or ExtractionSettings()
-        self._settings = MapperSettings().with_noise(extraction.noise)
+        self._extraction = extraction or ExtractionSettings()
+        self._settings = MapperSettings().with_noise(self._extraction.noise)
         self._distortion, self._reckoning = Distortion(), DeadReckoning()
         self._is_nowhere = False  # in a known map, as long as the pose was not found
         self._state: State = "starting"
@@ -96,6 +96,13 @@ class WholeScans:
         newer = [pose.pose[:2] for pose in self._chain(known)[1:]]
         here = [] if self._here is None else [self._here.pose[:2]]
         return np.vstack([known.poses[:, :2], *newer, *here])
+
+    def renew(self, extraction: ExtractionSettings) -> None:
+        """Go on so: scans to come have that noise, and walls are found anew, if that differs from before."""
+        if extraction != self._extraction:
+            self._extraction = extraction
+            self._front.take_noise(extraction.noise)
+            self._background.renew(extraction)
 
     def place(self, pose: ArrayLike, covariance: ArrayLike) -> None:
         """Say by hand where the sensor is in a known map: T_map_sensor (3,) m, m, rad and its covariance (3, 3).

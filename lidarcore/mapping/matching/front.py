@@ -16,6 +16,7 @@ from lidarcore.mapping.matching.standing import Standing
 from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, elapsed, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.tracked import Tracked
+from lidarcore.noise import SensorNoise
 from lidarcore.scan import Scan
 
 _FLOOR = np.diag([0.01, 0.01, 0.005]) ** 2  # what a step is never known better than: the search needs room
@@ -45,6 +46,10 @@ class FrontEnd:
         self._wheels = OdometryCalibration()
         self._standing = Standing(settings)
         self._motion, self._period = Persistence(), 0.0  # s between scans, as stamps of single scans jitter
+
+    def take_noise(self, noise: SensorNoise) -> None:
+        """Scans to come have that noise; those in the map keep what they were seen with."""
+        self._settings = replace(self._settings, match=replace(self._settings.match, noise=noise))
 
     def step(self, scan: Scan, removed: Array | None = None) -> Tracked:
         """Place a scan; removed (3,) m/s, m/s, rad/s is the motion that was taken out of it already.
