@@ -121,7 +121,10 @@ class FrontEnd:
         rival = self._map.rival(seen, guess, registered)
         is_chance = self._map.is_chance(seen, guess, registered)
         on = registered.inliers >= self._settings.inliers and not is_chance and rival is None
-        matched = self._map.tie(registered) if on else guess
+        matched = guess
+        if on:
+            pose, P = self._map.tie(registered)
+            matched = UncertainPose(pose, P + self._map.scatter(seen, guess, registered))
         if rival is not None:
             return matched, self._map.either(registered, rival), on
         return matched, UncertainPose(matched.pose, matched.covariance + self._sweep.covariance), on

@@ -62,12 +62,10 @@ class LocalMap:
         prior = information_of(P)
         sigma = np.sqrt(np.diagonal(P))
         near = seen.near.means
-        far = arm(near) if len(near) else 0.0
         registered = at_guess = register(self._surfels, seen, x, x, prior, match.reach)
         if len(near) < BLIND:
             return registered
-        is_vague = 3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE
-        if registered.inliers < SURE or (is_vague and registered.inliers + _BETTER < 1):
+        if registered.inliers < SURE or (_is_vague(sigma, near) and registered.inliers + _BETTER < 1):
             registered = self._searched(seen, x, sigma, prior, registered)
         if registered.inliers < SURE:
             registered = self._searched(seen, x, _FURTHER * sigma, prior, registered)
@@ -108,6 +106,27 @@ class LocalMap:
                 return other.pose
         return None
 
+    def scatter(self, seen: Patches, guess: UncertainPose, registered: Registration) -> Array:
+        """(3, 3) of how far from where it was registered a scan fits as well, or worse only by chance.
+
+        A scan of few beams that shows much new fits in several ways, some degrees apart: registered from either side,
+        as far as the guess leaves its heading open, it comes to lie elsewhere.
+        """
+        match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
+        sigma, prior, near = np.sqrt(np.diagonal(P)), information_of(P), seen.near.means
+        spread, total = np.zeros((3, 3)), 1.0
+        if not _is_vague(sigma, near) or registered.inliers + _BETTER >= 1:
+            return spread
+        for turn in (-sigma[2], sigma[2]):
+            start = registered.pose + np.array([0.0, 0.0, turn])
+            other = register(self._surfels, seen, start, x, prior, match.reach)
+            off = pose_difference(other.pose, registered.pose)
+            if off @ registered.information @ off > 1:
+                likelihood = _likelihood(other, registered, x, prior, len(near))
+                spread += likelihood * np.outer(off, off)
+                total += likelihood
+        return spread / total
+
     def is_chance(self, seen: Patches, guess: UncertainPose, registered: Registration) -> bool:
         """Whether a scan that contradicts the guess fits no better than that costs: some of it fits anywhere."""
         x, P = UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
@@ -138,6 +157,20 @@ class LocalMap:
         """The pose seen from the keyframe."""
         exact = UncertainPose(self._anchor, np.zeros((3, 3)))
         return exact.relative(UncertainPose(registered.pose, information_of(registered.information)))
+
+
+def _is_vague(sigma: Array, near: Array) -> bool:
+    """Whether a guess with standard deviations (3,) may put points (N, 2) of a scan far from where they are."""
+    far = arm(near) if len(near) else 0.0
+    return bool(3 * (np.hypot(sigma[0], sigma[1]) + far * sigma[2]) > _WIDE)
+
+
+def _likelihood(other: Registration, best: Registration, guess: Array, prior: Array, n: int) -> float:
+    """Of another pose of n patches, if it fits worse than the best one by chance: beside 1 for the best one."""
+    less = max(best.inliers - other.inliers, 0.0)
+    variance = (2 - best.inliers - other.inliers) / n  # of two shares
+    surprise = [loss(_contradiction(one, guess, prior), DOUBTFUL) for one in (other, best)]
+    return float(np.exp(-(less**2 / variance + max(surprise[0] - surprise[1], 0.0)) / 2))
 
 
 def _worth(registered: Registration, n: int, guess: Array, prior: Array) -> float:

@@ -1,0 +1,59 @@
+"""A scan that fits in several ways, some degrees apart, does not claim to be known as well as in one of them."""
+
+import numpy as np
+from mapping_scenes import NOISE, SETTINGS, full_scan
+from scipy.stats import chi2
+
+from lidarcore.geometry import UncertainPose, pose_difference, squared_mahalanobis
+from lidarcore.mapping.matching.local_map import LocalMap
+from lidarcore.mapping.matching.patches import patches
+from lidarcore.simulation import World, furnished_room
+
+TURNED = 0.15  # rad, standard deviation of what wheels say
+TOOTH = 2 * np.pi / 50  # rad
+
+
+def toothed() -> World:
+    """A round room, 3 m to the walls, whose walls are the same every tooth."""
+    edges = np.arange(0, 2 * np.pi, TOOTH)
+    inner, outer = (r * np.stack([np.cos(edges), np.sin(edges)], -1) for r in (3.0, 3.4))
+    slants, sides = np.stack([inner, np.roll(outer, -1, axis=0)], 1), np.stack([outer, inner], 1)
+    return World(np.concatenate([slants, sides]))
+
+
+def registered(world: World, turn: float, guessed: float, rng: np.random.Generator) -> UncertainPose:
+    """Of a scan after a turn, on a map of the scan before it."""
+    before, after = (
+        full_scan(world, np.array([0.0, 0.0, heading]), NOISE, rng) for heading in (0.4, 0.4 + turn)
+    )
+    local, seen = LocalMap(SETTINGS.front), patches(after, SETTINGS.front.match)
+    local.add(before, patches(before, SETTINGS.front.match))
+    guess = UncertainPose(np.array([0.0, 0.0, guessed]), np.diag([0.1, 0.1, TURNED]) ** 2)
+    found = local.registered(after, seen, guess)
+    tie = local.tie(found)
+    return UncertainPose(tie.pose, tie.covariance + local.scatter(seen, guess, found))
+
+
+def held(world: World, trials: int) -> tuple[float, float]:
+    """Share of the turns within their 95 % ellipsoids, and the largest standard deviation of a heading."""
+    rng = np.random.default_rng(7)
+    turns = rng.normal(0, 0.3, trials)
+    found = [registered(world, turn, turn + rng.normal(0, TURNED), rng) for turn in turns]
+    off = np.array(
+        [pose_difference(one.pose, [0.0, 0.0, turn]) for one, turn in zip(found, turns, strict=True)]
+    )
+    P = np.array([one.covariance for one in found])
+    return float((squared_mahalanobis(off, P) < chi2.isf(0.05, 3)).mean()), float(np.sqrt(P[:, 2, 2].max()))
+
+
+def test_where_walls_are_the_same_every_few_degrees_a_heading_is_as_vague_as_that():
+    """Two other ways in which a scan fits are looked at, not all: some turns lie farther off than these."""
+    share, vaguest = held(toothed(), 100)
+    assert share > 0.8
+    assert vaguest > TOOTH / 2
+
+
+def test_in_a_room_that_looks_another_way_to_every_side_a_heading_is_known_as_well_as_it_fits():
+    share, vaguest = held(furnished_room(), 40)
+    assert share > 0.9
+    assert vaguest < 0.01
