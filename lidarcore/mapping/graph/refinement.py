@@ -32,7 +32,7 @@ from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.matching.patches import Patches
 
 _FIXED = 1e12  # information of the first pose
-_SETTLED = 1e-4  # m and rad
+_SETTLED = 0.01  # mean square of a step, in variances of the poses, from which on it changes nothing that is known
 _LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
 
 
@@ -123,11 +123,11 @@ def refine(
     for _ in range(rounds):
         equations, cells = normal_equations(seen, poses, islands, size, scale, unevenness, known)
         H, g = _with_steps(equations, poses, steps)
-        step = factor(H).solve(-g).reshape(-1, 3)
-        poses = poses + step
+        step = factor(H).solve(-g)
+        poses = poses + step.reshape(-1, 3)
         poses[:, 2] = wrap(poses[:, 2])
         scale, unevenness = _measured(equations.groups, cells, len(poses))
-        if np.abs(step).max() < _SETTLED:
+        if -g @ step < _SETTLED * len(g):
             break
     equations, _ = normal_equations(seen, poses, islands, size, scale, unevenness, known)
     recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
