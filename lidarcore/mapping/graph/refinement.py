@@ -32,7 +32,7 @@ from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.matching.patches import Patches
 
 _FIXED = 1e12  # information of the first pose
-_SETTLED = 0.01  # mean square of a step, in variances of the poses, from which on it changes nothing that is known
+_SETTLED = 0.01  # mean square of a step, in variances of the poses, below which it changes nothing
 _LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
 
 
