@@ -66,7 +66,7 @@ export function choiceRow(label, name, choices, { value: chosen, change }, attri
 
 /** A small toggle, several of which stand in a line. */
 export function chip(label, path, hint = "") {
-  const box = bind(el("input", { type: "checkbox", class: "visually-hidden" }), path);
+  const box = bind(el("input", { type: "checkbox", id: idOf(path), class: "visually-hidden" }), path);
   return el("label", { class: "chip", title: hint }, box, el("span", {}, label));
 }
 

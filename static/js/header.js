@@ -32,7 +32,7 @@ const READOUTS = [
     label: "Latency",
     hint: "From the last byte of a scan to sending it to this page, median",
     now: true,
-    text: () => milliseconds(quantile(({ age }) => age, 0.5)),
+    text: ({ source }) => milliseconds(isPlaying(source) ? quantile(({ age }) => age, 0.5) : NaN),
   },
   {
     key: "frame",

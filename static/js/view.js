@@ -1,6 +1,6 @@
 // What the scene shows: layers, colours, the size of the ellipses, and the legend that says so.
 
-import { chip, selectRow, switchRow } from "./bindings.js";
+import { chip, idOf, selectRow, switchRow } from "./bindings.js";
 import { settings } from "./actions.js";
 import { $, el, remake } from "./dom.js";
 import { stroke } from "./figure.js";
@@ -45,6 +45,15 @@ export function mountView() {
   foldLegend();
   narrow.addEventListener("change", foldLegend);
   for (const key of ["frame", "settings", "methods", "sizes", "localization"]) on([key], refreshLegend);
+  on(["frame"], hideUnknownPaths);
+}
+
+/** Paths that nothing tells of, where a recording has no odometry or no truth, have no toggle. */
+function hideUnknownPaths({ localization: now }) {
+  for (const { layer, isKnown } of PATHS.filter(({ layer }) => layer === "dead_reckoned" || layer === "truth")) {
+    const toggle = $(idOf(`view.layers.${layer}`))?.closest(".chip");
+    if (toggle) toggle.hidden = Boolean(now) && !isKnown(now);
+  }
 }
 
 const foldLegend = () => ($("legend").open = !narrow.matches);

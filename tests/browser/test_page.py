@@ -71,9 +71,12 @@ def test_the_scene_is_drawn_once_for_each_scan(visitor: Visitor) -> None:
 @pytest.mark.real_data
 def test_while_a_recording_is_paused_nothing_comes_at_any_rate(visitor: Visitor) -> None:
     visitor.server.show(GOLF, 2)
-    expect(visitor.page.locator("#readout-rate")).to_have_text("\u2013")
+    rate, latency = (visitor.page.locator(f"#readout-{name}") for name in ("rate", "latency"))
+    expect(rate).to_have_text("\u2013")
+    expect(latency).to_have_text("\u2013")
     visitor.server.patch("source", {"state": "playing"})
-    expect(visitor.page.locator("#readout-rate")).to_contain_text("Hz")
+    expect(rate).to_contain_text("Hz")
+    expect(latency).to_contain_text("ms")
 
 
 @pytest.mark.long

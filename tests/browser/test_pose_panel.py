@@ -42,3 +42,18 @@ def test_speed_is_that_of_the_way_however_the_sensor_is_mounted(visitor: Visitor
     shown = re.match(r"(\d+\.\d+).m/s", fact(visitor, "Speed"))
     assert shown
     assert float(shown[1]) == pytest.approx(speed, abs=0.02)
+
+
+def test_a_path_that_nothing_tells_of_has_no_toggle(visitor: Visitor) -> None:
+    """A real RPLIDAR's recording has neither odometry nor a truth; a simulated robot has both."""
+    server, page = visitor.server, visitor.page
+    open_windsor(server, index=10)
+    page.get_by_role("tab", name="Map").click()
+    names = ("Estimated path", "Odometry path", "True path")
+    estimated, *others = (page.locator(".chip", has_text=name) for name in names)
+    expect(estimated).to_be_visible()
+    for toggle in others:
+        expect(toggle).to_be_hidden()
+    server.api.put("source", json={"kind": "simulation"}).raise_for_status()
+    for toggle in others:
+        expect(toggle).to_be_visible()

@@ -6,7 +6,8 @@ import { fixed } from "../units.js";
 const APART_PX = 70; // between lines, at least
 const MOST = 60; // lines each way: seen at a slant, the floor goes on and on
 const INSET = 6; // px, of the numbers from the lower edge
-const LEFT = 14; // px, from the left one, where the legend may hide them whole
+const LEFT = 14; // px, from the left one
+const HIGH = 14; // px, of a number, as wide as half of that for each of its characters
 const BAR_PX = 120; // of the scale bar, at most
 
 /** The smallest of 1, 2, 5 times a power of ten, m, by which lines are far enough apart. */
@@ -18,8 +19,11 @@ function stepOf(look) {
 
 const digitsOf = (step) => Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
 
-/** Draws the lines, and the metres of each at the edge of the view. */
-export function drawGrid(pen, look, { line, axis, text, halo }) {
+/**
+ * Draws the lines, and the metres of each at the edge of the view, but for numbers of which part would lie under what covers
+ * the lower left corner: {right, top, bottom}, px.
+ */
+export function drawGrid(pen, look, { line, axis, text, halo }, covered = null) {
   const step = stepOf(look);
   const bounds = boundsOf(look);
   if (!bounds || !Number.isFinite(step)) return;
@@ -30,7 +34,7 @@ export function drawGrid(pen, look, { line, axis, text, halo }) {
       const ends = bounds[1 - along].map((end) => look.toScreen(along ? [end, at * step] : [at * step, end]));
       if (!ends.every(Boolean)) continue;
       pen.path(ends.map(crisp), { stroke: at === 0 ? axis : line, width: 1 });
-      name(pen, look, ends, `${fixed(at * step, digitsOf(step))}${at === 0 ? "" : "\u2009m"}`, { fill: text, halo });
+      name(pen, look, covered, ends, `${fixed(at * step, digitsOf(step))}${at === 0 ? "" : "\u2009m"}`, { fill: text, halo });
     }
   }
 }
@@ -50,14 +54,16 @@ function boundsOf(look) {
 const crisp = ([x, y]) => [Math.round(x) + 0.5, Math.round(y) + 0.5];
 
 /** A number where an upright line leaves the view below, or a level one at the left. */
-function name(pen, { width, height }, [[x0, y0], [x1, y1]], words, style) {
+function name(pen, { width, height }, covered, [[x0, y0], [x1, y1]], words, style) {
+  const wide = (HIGH / 2) * words.length;
+  const isFree = (left, base) => !covered || left > covered.right || base < covered.top || base - HIGH > covered.bottom;
   const isUpright = Math.abs(y1 - y0) > Math.abs(x1 - x0);
   if (isUpright) {
     const x = x0 + ((height - y0) / (y1 - y0)) * (x1 - x0);
-    if (x > 30 && x < width - 30) pen.text([x, height - INSET], words, { ...style, anchor: "middle" });
+    if (x > 30 && x < width - 30 && isFree(x - wide / 2, height - INSET)) pen.text([x, height - INSET], words, { ...style, anchor: "middle" });
   } else {
     const y = y0 + ((0 - x0) / (x1 - x0)) * (y1 - y0);
-    if (y > 20 && y < height - 24) pen.text([LEFT, y - 4], words, style);
+    if (y > 20 && y < height - 24 && isFree(LEFT, y - 4)) pen.text([LEFT, y - 4], words, style);
   }
 }
 

@@ -41,6 +41,7 @@ export function mountOverlay() {
     on([key], () => get("frame") && (world = worldOf(get("frame"), get("landmarks") ?? new Map(), get("mapped"))));
   for (const key of ["frame", "settings", "selection", "wall", "mappedWall", "mapped", "landmarks", "methods", "measure", "place", "around", "tools"]) on([key], redraw);
   new ResizeObserver(redraw).observe($("stage"));
+  $("legend").addEventListener("toggle", redraw);
   $("scene").addEventListener("load", follow);
   follow();
   mountButtons();
@@ -85,15 +86,21 @@ function draw() {
   if (colours?.theme !== theme()) colours = { theme: theme(), ...coloursNow() };
   const look = lookNow();
   const pen = new CanvasPen(cleared(look));
-  drawOver(pen, look);
+  drawOver(pen, look, legendBox());
 }
 
-/** Draws all there is with a pen, as seen by a look. */
-export function drawOver(pen, look) {
+/** What the legend covers of the view. */
+function legendBox() {
+  const { offsetLeft: left, offsetTop: top, offsetWidth: width, offsetHeight: height } = $("legend");
+  return { right: left + width, top, bottom: top + height };
+}
+
+/** Draws all there is with a pen, as seen by a look; what covers the lower left corner hides none of a number in part. */
+export function drawOver(pen, look, covered = null) {
   const { view, sensor } = get("settings");
   const selection = { ...get("selection"), wall: selectedWall(world.frame)?.id, mapped: get("mappedWall") };
   const hovered = pointed ? thingsAt(world, view.layers, look, pointed) : [];
-  if (view.layers.grid) drawGrid(pen, look, { ...colours, text: colours.number });
+  if (view.layers.grid) drawGrid(pen, look, { ...colours, text: colours.number }, covered);
   if (view.layers.walls && plainCamera()) drawMapped(pen, look, world, colours);
   if (view.layers.segments && plainCamera()) drawWalls(pen, look, world, colours);
   tell(drawMarks(pen, look, world, { view, mask: sensor.mask ?? [], selection, hovered, colours }));
