@@ -7,7 +7,7 @@ import { $, swatch } from "./dom.js";
 import { line, makeFigure, stroke } from "./figure.js";
 import { columns } from "./history.js";
 import { throttled } from "./throttle.js";
-import { errorOf, positionSigma } from "./pose.js";
+import { errorOf, isOfScans, positionSigma } from "./pose.js";
 import { on } from "./store.js";
 import { fixed, microseconds, squareMillimetres, wholeMillimetres } from "./units.js";
 
@@ -37,7 +37,8 @@ const PLOTS = [
   },
 ];
 
-const FILTER_PLOTS = [
+/** Of a filter of landmarks; whole scans have no innovations. */
+const INNOVATION_PLOTS = [
   {
     title: "Squared innovations, normalised (NIS)",
     series: () => [
@@ -60,28 +61,31 @@ const FILTER_PLOTS = [
     scale: "outlying",
     text: wholeMillimetres,
   },
-  {
-    title: "Position, mm",
-    series: () => [
-      line({ label: "1σ", key: "sigma", tone: "--text", read: ofFilter(positionSigma) }),
-      line({
-        label: "true error",
-        key: "error",
-        tone: "--bad",
-        read: ofFilter((now) => errorOf(now)?.distance),
-      }),
-    ],
-    scale: "decades",
-    text: wholeMillimetres,
-  },
 ];
+
+const POSITION_PLOT = {
+  title: "Position, mm",
+  series: () => [
+    line({ label: "1σ", key: "sigma", tone: "--text", read: ofFilter(positionSigma) }),
+    line({
+      label: "true error",
+      key: "error",
+      tone: "--bad",
+      read: ofFilter((now) => errorOf(now)?.distance),
+    }),
+  ],
+  scale: "decades",
+  text: wholeMillimetres,
+};
 
 let figures = [];
 let made = "";
 
 export function mountPlots() {
   const draw = throttled(REDRAW_MS, redraw);
-  on(["frame", "panel", "settings", "methods"], (frame, panel) => panel === "plots" && draw(frame));
+  on(["frame", "panel", "settings", "localization", "methods"], (frame, panel, { navigation }, localization) => {
+    if (panel === "plots") draw(frame, isOfScans(navigation, localization));
+  });
 }
 
 /** Reads a figure of the filter from a sample; nothing while it is off, or there is nothing to tell. */
@@ -101,8 +105,9 @@ function perMethod(figure) {
     });
 }
 
-function redraw({ methods, localization }) {
-  const kinds = localization ? [...FILTER_PLOTS, ...PLOTS] : PLOTS;
+function redraw({ methods, localization }, ofScans) {
+  const ofPose = localization ? [...(ofScans ? [] : INNOVATION_PLOTS), POSITION_PLOT] : [];
+  const kinds = [...ofPose, ...PLOTS];
   const wanted = `${methods.join()} ${document.documentElement.dataset.theme} ${kinds.length}`;
   if (wanted !== made) make(kinds, methods);
   made = wanted;

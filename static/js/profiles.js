@@ -63,7 +63,7 @@ async function put(name, body, overwrite = false) {
 /** What is wrong with the content of a file comes with `errors`, and is told as the list of profiles tells it. */
 function inWords(problem) {
   if (!problem.members?.errors) return problem;
-  return new Problem({ ...problem, detail: `The file is not a profile: ${problem.message}.` });
+  return new Problem({ ...problem, detail: `The file is not a profile: ${problem.message.replace(/\.$/, "")}.` });
 }
 
 const pathOf = (name) => `profiles/${encodeURIComponent(name)}`;

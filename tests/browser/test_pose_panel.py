@@ -57,3 +57,14 @@ def test_a_path_that_nothing_tells_of_has_no_toggle(visitor: Visitor) -> None:
     server.api.put("source", json={"kind": "simulation"}).raise_for_status()
     for toggle in others:
         expect(toggle).to_be_visible()
+
+
+def test_innovations_are_plotted_only_of_a_filter_that_has_some(visitor: Visitor) -> None:
+    server, page = visitor.server, visitor.page
+    open_windsor(server, index=10)
+    page.get_by_role("tab", name="Plots").click()
+    figures = page.locator("#plots figure")
+    expect(figures.filter(has_text="Position, mm")).to_be_visible()
+    expect(figures.filter(has_text="nnovations")).to_have_count(0)
+    server.patch("settings", {"navigation": {"mode": "slam", "method": "landmarks"}})
+    expect(figures.filter(has_text="nnovations")).to_have_count(2)
