@@ -1,23 +1,20 @@
 """The back end: keyframes become nodes of a pose graph, loops bend it."""
 
 from collections import deque
-from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import HERE, compose, pose_difference, relative, squared_mahalanobis
-from lidarcore.mapping.doubt import DOUBTFUL
+from lidarcore.geometry import HERE, UncertainPose, compose, pose_difference, relative
 from lidarcore.mapping.graph.known import Known, known, known_besides, near_unknown
 from lidarcore.mapping.graph.pose_graph import PoseGraph
-from lidarcore.mapping.graph.refinement import Refined, Step, refine
+from lidarcore.mapping.graph.refinement import Refined, refine
 from lidarcore.mapping.loops.closure import LoopFinder
 from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.islands import Islands, moved
 from lidarcore.mapping.loops.keyframes import Keyframe, View
+from lidarcore.mapping.loops.steps import Steps
 from lidarcore.mapping.loops.thinning import spare
-from lidarcore.mapping.matching.odometry_calibration import effects
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.sight import sight
 from lidarcore.mapping.matching.sweep import without
@@ -30,24 +27,12 @@ _LATER = 9  # last views from where a sensor stood: as many as a cell takes to b
 _SETTLED = 0.01  # m and rad of the last step, after which the poses are far better than that
 
 
-class _Driven(NamedTuple):
-    """How a keyframe's edge hangs on odometry.
-
-    taken  (3,) errors of odometry that were taken out
-    share  (3, 3) of the motion by odometry that is in the edge: nearly none where scans tell it
-    """
-
-    taken: Array
-    share: Array
-
-
 class BackEnd:
     """A pose graph of keyframes that closes loops.
 
     graph      PoseGraph of the keyframes
     keyframes  by their nodes, in the order of time; `thin` leaves some nodes without
     loops      the loops that were believed
-    steps      how each keyframe was reached, by motion alone
     """
 
     def __init__(self, settings: MapperSettings) -> None:
@@ -55,10 +40,8 @@ class BackEnd:
         self.graph = PoseGraph()
         self.loops: list[Loop] = []
         self.keyframes: dict[int, Keyframe] = {}
-        self.steps: list[Step] = []
         self._later: dict[int, deque[View]] = {}  # of a sensor that still stands, by its keyframe's node
-        self._edges: list[int] = []  # of the graph, which tie the same keyframes by what was seen as well
-        self._driven: dict[int, _Driven] = {}  # by the number of the step
+        self._steps = Steps(self.graph)
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
 
@@ -82,13 +65,12 @@ class BackEnd:
             moved = tie  # nothing was seen that tells more
         node = self.graph.add(compose(self.graph.poses[before], tie.pose))
         self.keyframes[node] = _keyframe(tracked)
-        self.steps.append(Step(before, node, *moved))
-        P = tie.covariance + self._settings.drift_covariance
-        self._edges.append(self.graph.connect(before, node, tie.pose, P))
+        tie = UncertainPose(tie.pose, tie.covariance + self._settings.drift_covariance)
+        self._steps.add(before, node, moved, tie)
         if tracked.island:
             self._islands.begin(node, before)
-        elif tracked.wheels is not None:
-            self._driven[len(self.steps) - 1] = _Driven(tracked.wheels, _share(tracked))
+        else:
+            self._steps.tell_of_wheels(tracked)
         self._join(node)
         self._close(self._finder.find(node))
 
@@ -124,13 +106,7 @@ class BackEnd:
 
     def recalibrate(self, errors: Array) -> None:
         """Take out of all steps what odometry does wrong (3,) at each, which was known less well on the way."""
-        for number, driven in self._driven.items():
-            step = self.steps[number]
-            change = effects(step.pose) @ (errors - driven.taken)
-            self.steps[number] = replace(step, pose=step.pose + change)
-            self.graph.amend(self._edges[number], driven.share @ change)
-            self._driven[number] = driven._replace(taken=errors)
-        if self._driven:
+        if self._steps.recalibrate(errors):
             self.graph.optimize(_SETTLED)
 
     def search_beside(self) -> int:
@@ -171,23 +147,14 @@ class BackEnd:
         return refined
 
     def _parts(self) -> Known:
-        steps = [self.graph.edge(edge).covariance for edge in self._edges]
-        return known(self.graph, self._settings.front.match.reach, np.reshape(steps, (-1, 3, 3)))
-
-    def _steps(self, parts: Known) -> list[Step]:
-        """By motion alone where surfaces tell the rest; by what was seen where they need not be the same."""
-        part = parts.part
-        return [
-            step if parts.pairs[part[step.i], part[step.j]] else Step(step.i, step.j, *self.graph.edge(edge))
-            for step, edge in zip(self.steps, self._edges, strict=True)
-        ]
+        return known(self.graph, self._settings.front.match.reach, self._steps.covariances())
 
     def _refined(self, parts: Known) -> Refined:
         match, sweeps = self._settings.front.match, [keyframe.sweep for keyframe in self.keyframes.values()]
         return refine(
             [keyframe.patches for keyframe in self.keyframes.values()],
             self.graph.poses,
-            self._steps(parts),
+            self._steps.besides(parts),
             self._settings.cell,
             self._islands.numbers,
             np.array(sweeps),
@@ -226,15 +193,6 @@ class BackEnd:
 
 def _keyframe(tracked: Tracked) -> Keyframe:
     return Keyframe(tracked.number, tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
-
-
-def _share(tracked: Tracked) -> Array:
-    """Derivative (3, 3) of a keyframe's tie for the motion by odometry that took part in it; 0 if wheels slipped."""
-    moved = tracked.moved
-    if squared_mahalanobis(pose_difference(tracked.tie.pose, moved.pose), moved.covariance) > DOUBTFUL:
-        return np.zeros((3, 3))
-    share: Array = (tracked.tie.covariance - tracked.sweep) @ np.linalg.inv(moved.covariance)
-    return share
 
 
 def _agrees(loop: Loop, poses: Array) -> bool:
