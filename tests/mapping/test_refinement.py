@@ -87,6 +87,23 @@ def test_a_wall_that_bends_has_the_directions_of_its_parts():
     np.testing.assert_allclose(together / largest, apart / largest, atol=0.01)
 
 
+@pytest.mark.parametrize("off", [-0.4, 0.4])
+def test_steps_count_the_same_wherever_the_poses_are_to_begin_with(off):
+    """What a third keyframe saw is of another island: two steps alone lead there, a metre apart and equally vague."""
+    truth = np.array([[0.0, 0.0, 0.0], [0.4, 0.1, 0.1], [1.4, 0.1, 0.1]])
+    scans = seen_from(rectangular_room(6, 4), truth, np.random.default_rng(3))
+    between = relative(truth[1], truth[2])
+    aside = np.array([0.5, 0.0, 0.0])
+    steps = [
+        Step(0, 1, relative(truth[0], truth[1]), VAGUE),
+        Step(1, 2, between - aside, VAGUE),
+        Step(1, 2, between + aside, VAGUE),
+    ]
+    begin = np.array([truth[0], truth[1], compose(truth[1], between + np.array([off, 0, 0]))])
+    found = refine(scans, begin, steps, 0.5, islands=np.array([0, 0, 1])).poses
+    np.testing.assert_allclose(relative(found[1], found[2]), between, atol=1e-3)
+
+
 def _inverse(pose):
     return relative(pose, np.zeros(3))
 

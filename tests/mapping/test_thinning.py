@@ -40,7 +40,8 @@ def test_a_map_that_is_thinned_still_closes_loops_and_ends_where_the_robot_is():
         for one, _ in placed:
             node = before + one.node
             if before and one is first:
-                back.add(replace(one, node=before - 1, tie=UncertainPose(to_start, again)))
+                tie = UncertainPose(to_start, again)
+                back.add(replace(one, node=before - 1, tie=tie, moved=tie))
             else:
                 back.add(replace(one, node=node, first=None if before else one.first))
         before += len(placed)

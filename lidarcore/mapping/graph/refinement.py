@@ -20,11 +20,9 @@ from lidarcore.geometry import (
     relative,
     relative_jacobians,
     rotation,
-    squared_mahalanobis,
     wrap,
 )
 from lidarcore.geometry.kernels import relative_with_covariance
-from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.graph.adjustment import NormalEquations, normal_equations
 from lidarcore.mapping.graph.adjustment_cells import Groups, Observations
 from lidarcore.mapping.graph.known import Known
@@ -153,7 +151,7 @@ def _observations(scans: list[Patches], assumed: float) -> Observations:
 
 
 def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> tuple[csc_array, Array]:
-    """The normal equations with the steps, as far as they agree with the poses, and the first pose fixed."""
+    """The normal equations with the steps, and the first pose fixed."""
     H, g = equations.information, equations.gradient.copy()
     ends = np.array([(step.i, step.j) for step in steps], np.int64).reshape(-1, 2)
     z = np.array([step.pose for step in steps]).reshape(-1, 3)
@@ -161,8 +159,7 @@ def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> 
     a, b = poses[ends[:, 0]], poses[ends[:, 1]]
     A, B = relative_jacobians(a, b)
     e = pose_difference(relative(a, b), z)
-    weights = trust(squared_mahalanobis(e, covariances), DOUBTFUL)
-    W = np.linalg.inv(covariances) * weights[:, None, None]
+    W = np.linalg.inv(covariances)
     J = np.concatenate([A, B], -1)
     blocks = np.swapaxes(J, -1, -2) @ W @ J
     index = (3 * ends[:, :, None] + np.arange(3)).reshape(-1, 6)

@@ -7,7 +7,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, pose_difference, squared_mahalanobis
-from lidarcore.mapping.doubt import DOUBTFUL
+from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.graph.known import Known
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Step
@@ -36,8 +36,13 @@ class Steps:
         self._driven: dict[int, _Driven] = {}  # by the number of the step
 
     def add(self, i: int, j: int, moved: UncertainPose, tie: UncertainPose) -> None:
-        """From keyframe i to j: T_i_j by motion alone, and by what was seen."""
-        self._by_motion.append(Step(i, j, *moved))
+        """From keyframe i to j: T_i_j by motion alone, which counts less if it contradicts what was seen, and by that.
+
+        How much it counts stays: where surfaces say next to nothing, as in a bare corridor, their errors would carry a
+        few scans away from what wheels say, and wheels would count the less the farther they went.
+        """
+        chi2 = squared_mahalanobis(pose_difference(tie.pose, moved.pose), moved.covariance)
+        self._by_motion.append(Step(i, j, moved.pose, moved.covariance / trust(chi2, DOUBTFUL)))
         self._edges.append(self._graph.connect(i, j, *tie))
 
     def tell_of_wheels(self, tracked: Tracked) -> None:
