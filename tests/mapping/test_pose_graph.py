@@ -122,6 +122,23 @@ def test_a_true_loop_bends_a_stiff_graph():
     assert np.hypot(*(graph.poses - true)[:, :2].T).max() < 0.1
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_a_vague_chain_that_is_bent_hard_does_not_fly_apart(seed):
+    """Whole Gauss-Newton steps lead some of these graphs millions of metres away."""
+    rng, graph, pose = np.random.default_rng(seed), PoseGraph(), np.zeros(3)
+    for k in range(1, 8):
+        step = np.array([5.0, 0.0, rng.normal(0, 0.8)])
+        pose = compose(pose, step)
+        graph.add(pose)
+        graph.connect(k - 1, k, step, np.diag([0.5, 0.5, 1.5]) ** 2)
+    for i, j in ((0, 7), (2, 5)):
+        graph.connect(i, j, rng.normal(0, [4, 4, 2]), np.diag([0.02, 0.02, 0.01]) ** 2)
+    before = graph.chi_square.sum()
+    graph.optimize()
+    assert graph.chi_square.sum() < 0.01 * before
+    assert np.abs(graph.poses[:, :2]).max() < 40
+
+
 def test_a_node_that_hangs_on_nothing_is_told_and_nothing_moves():
     graph, _, _ = ring(np.random.default_rng(5))
     graph.add([9.0, 9.0, 0.0])

@@ -21,6 +21,8 @@ from lidarcore.mapping.graph.recovery import Recovery, factor
 
 _COOLING = 4.0  # by which doubts about new edges set in earlier from round to round
 _FIXED = 1e12  # information of the first pose
+_HALVINGS = 12  # of a step that makes poses less likely
+_ROUNDING = 1e-9  # of what optimization makes smallest
 
 
 class PoseGraph:
@@ -107,13 +109,33 @@ class PoseGraph:
             H, b, chi2 = self._linearised(poses, heat)
             solver = factor(H)
             step = solver.solve(-b).reshape(-1, 3)
-            poses[1:] += step[1:]
-            poses[:, 2] = wrap(poses[:, 2])
+            step[0] = 0.0
+            poses = self._stepped(poses, step, heat)
             if heat == 1 and np.abs(step).max() < tolerance:
                 break
             heat = max(1.0, heat / _COOLING)
         self._poses, self._recovery, self._settled = poses, Recovery(solver), len(self._ends)
         return chi2
+
+    def _stepped(self, poses: Array, step: Array, heat: float) -> Array:
+        """Poses after a step (N, 3), or so much of it that they are more likely than before.
+
+        Where the heading of many nodes is open, as that of an island is, a whole step may lead to other ends.
+        """
+        before = self._cost(poses, heat)
+        for _ in range(_HALVINGS):
+            after = poses + step
+            after[:, 2] = wrap(after[:, 2])
+            if self._cost(after, heat) <= before + _ROUNDING * (1 + before):
+                return after
+            step = step / 2
+        return poses
+
+    def _cost(self, poses: Array, heat: float) -> float:
+        """What optimization makes smallest: chi-square, less where doubts begin."""
+        chi2 = edge_errors(poses, self._ends, self._relatives, self._informations)
+        doubts = np.minimum(heat * self._doubts, 1 + chi2)  # an edge that is not doubted costs its chi-square
+        return float(np.where(chi2 < doubts, chi2, doubts * (3 - 4 / (1 + chi2 / doubts))).sum())
 
     def covariance(self, i: int) -> Array:
         """Covariance (3, 3) of the pose of node i, given node 0."""

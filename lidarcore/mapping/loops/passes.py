@@ -37,7 +37,7 @@ class Passes:
                 continue
             closest = int(run[np.argmin(distances[run])])
             P = self._graph.relative(closest, k)[1]
-            if P[2, 2] > VAGUE**2:
+            if P[2, 2] > VAGUE**2 or np.linalg.eigvalsh(P)[0] <= 0:  # of islands, rounding may leave nothing
                 continue
             radius = settings.distance + settings.sigmas * spread(P)
             if distances[closest] > min(radius, settings.farthest) or (np.diagonal(P) < _KNOWN**2).all():
