@@ -4,9 +4,11 @@ import numpy as np
 from mapping_scenes import NOISE, SETTINGS, full_scan
 from scipy.stats import chi2
 
+from lidarcore import Scan
 from lidarcore.geometry import UncertainPose, pose_difference, squared_mahalanobis
 from lidarcore.mapping.matching.local_map import LocalMap
 from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.matching.registration import Registration
 from lidarcore.simulation import World, furnished_room
 
 TURNED = 0.15  # rad, standard deviation of what wheels say
@@ -57,3 +59,13 @@ def test_in_a_room_that_looks_another_way_to_every_side_a_heading_is_known_as_we
     share, vaguest = held(furnished_room(), 40)
     assert share > 0.9
     assert vaguest < 0.01
+
+
+def test_a_scan_that_sees_nothing_near_says_nothing_of_other_ways():
+    """What walls far away told of it may not be where the guess has it."""
+    scan = full_scan(furnished_room(), np.array([3.0, 3.0, 0.0]), NOISE, np.random.default_rng(1))
+    local, guess = LocalMap(SETTINGS.front), UncertainPose(np.zeros(3), np.diag([0.3, 0.3, TURNED]) ** 2)
+    local.add(scan, patches(scan, SETTINGS.front.match))
+    nothing = patches(Scan(np.full(9, np.nan), np.linspace(0, 1, 9)), SETTINGS.front.match)
+    found = Registration(np.array([0.0, 0.0, 0.5]), 1e4 * np.eye(3), 0.5)
+    assert np.array_equal(local.scatter(nothing, guess, found), np.zeros((3, 3)))

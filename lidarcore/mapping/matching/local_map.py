@@ -115,7 +115,7 @@ class LocalMap:
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         sigma, prior, near = np.sqrt(np.diagonal(P)), information_of(P), seen.near.means
         spread, total = np.zeros((3, 3)), 1.0
-        if not _is_vague(sigma, near) or registered.inliers + _BETTER >= 1:
+        if len(near) < BLIND or not _is_vague(sigma, near) or registered.inliers + _BETTER >= 1:
             return spread
         for turn in (-sigma[2], sigma[2]):
             start = registered.pose + np.array([0.0, 0.0, turn])
