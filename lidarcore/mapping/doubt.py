@@ -1,9 +1,10 @@
 """How much counts what does not agree with the rest [Agarwal et al. 2013]."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.special import rel_entr
 
-from lidarcore.arrays import Numbers
+from lidarcore.arrays import Array, Numbers
 from lidarcore.compiled import inlined
 from lidarcore.geometry import chi_square_gate
 
@@ -21,9 +22,10 @@ def trust(chi2: Numbers, doubtful: float) -> Numbers:
 compiled_trust = inlined(trust)
 
 
-def loss(chi2: float, doubtful: float) -> float:
-    """What a disagreement by chi2 costs: its derivative is `trust`, so that it never exceeds 3 times `doubtful`."""
-    return chi2 if chi2 < doubtful else doubtful * (3 - 4 / (1 + chi2 / doubtful))
+def loss(chi2: ArrayLike, doubtful: ArrayLike) -> Array:
+    """What disagreements by chi2 cost: the derivative is `trust`, so that none exceeds 3 times `doubtful`."""
+    chi2, doubtful = np.asarray(chi2, np.float64), np.asarray(doubtful, np.float64)
+    return np.where(chi2 < doubtful, chi2, doubtful * (3 - 4 / (1 + chi2 / doubtful)))
 
 
 def evidence(fit: float, count: int) -> float:

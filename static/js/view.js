@@ -50,7 +50,7 @@ export function mountView() {
 
 /** Paths that nothing tells of, where a recording has no odometry or no truth, have no toggle. */
 function hideUnknownPaths({ localization: now }) {
-  for (const { layer, isKnown } of PATHS.filter(({ layer }) => layer === "dead_reckoned" || layer === "truth")) {
+  for (const { layer, isKnown } of PATHS.filter(({ isOfSome }) => isOfSome)) {
     const toggle = $(idOf(`view.layers.${layer}`))?.closest(".chip");
     if (toggle) toggle.hidden = Boolean(now) && !isKnown(now);
   }
@@ -94,7 +94,7 @@ const OF_SCAN = [
   { layer: "gaps", sign: "gap-sign", label: "Gap, data lost", isKnown: ({ gaps }) => gaps.length },
 ];
 
-/** Where the sensor is and was, as the scene may show it: layer -> sign, and whether it is known. */
+/** Where the sensor is and was, as the scene may show it: layer -> sign, whether it is known, and whether only some sources tell it. */
 const PATHS = [
   { layer: "pose", sign: "pose-sign", label: "Position, 95\u2009%", isKnown: isPlaced },
   { layer: "trail", sign: "trail", label: NAMES.trail, isKnown: () => true },
@@ -103,8 +103,9 @@ const PATHS = [
     sign: "reckoned",
     label: NAMES.dead_reckoned,
     isKnown: ({ dead_reckoned: way }) => way,
+    isOfSome: true,
   },
-  { layer: "truth", sign: "true", label: NAMES.truth, isKnown: ({ truth }) => truth },
+  { layer: "truth", sign: "true", label: NAMES.truth, isKnown: ({ truth }) => truth, isOfSome: true },
 ];
 
 /** What is drawn of the map: layer -> signs. */

@@ -15,7 +15,7 @@ from lidarcore.errors import LocalizationError
 from lidarcore.geometry import UncertainPose, as_pose_covariance, relative_jacobians, wrap
 from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.localization.ekf.estimate import as_pose
-from lidarcore.mapping.doubt import DOUBTFUL
+from lidarcore.mapping.doubt import DOUBTFUL, loss
 from lidarcore.mapping.graph.edges import edge_errors, linearise
 from lidarcore.mapping.graph.recovery import Recovery, factor
 
@@ -110,32 +110,30 @@ class PoseGraph:
             solver = factor(H)
             step = solver.solve(-b).reshape(-1, 3)
             step[0] = 0.0
-            poses = self._stepped(poses, step, heat)
+            step = self._shortened(step, poses, heat)
+            poses = _moved(poses, step)
             if heat == 1 and np.abs(step).max() < tolerance:
                 break
             heat = max(1.0, heat / _COOLING)
         self._poses, self._recovery, self._settled = poses, Recovery(solver), len(self._ends)
         return chi2
 
-    def _stepped(self, poses: Array, step: Array, heat: float) -> Array:
-        """Poses after a step (N, 3), or so much of it that they are more likely than before.
+    def _shortened(self, step: Array, poses: Array, heat: float) -> Array:
+        """A step (N, 3), or so much of it that poses do not become less likely; none of it if any does that.
 
         Where the heading of many nodes is open, as that of an island is, a whole step may lead to other ends.
         """
         before = self._cost(poses, heat)
         for _ in range(_HALVINGS):
-            after = poses + step
-            after[:, 2] = wrap(after[:, 2])
-            if self._cost(after, heat) <= before + _ROUNDING * (1 + before):
-                return after
+            if self._cost(_moved(poses, step), heat) <= before + _ROUNDING * (1 + before):
+                return step
             step = step / 2
-        return poses
+        return np.zeros(step.shape)
 
     def _cost(self, poses: Array, heat: float) -> float:
         """What optimization makes smallest: chi-square, less where doubts begin."""
         chi2 = edge_errors(poses, self._ends, self._relatives, self._informations)
-        doubts = np.minimum(heat * self._doubts, 1 + chi2)  # an edge that is not doubted costs its chi-square
-        return float(np.where(chi2 < doubts, chi2, doubts * (3 - 4 / (1 + chi2 / doubts))).sum())
+        return float(loss(chi2, heat * self._doubts).sum())
 
     def covariance(self, i: int) -> Array:
         """Covariance (3, 3) of the pose of node i, given node 0."""
@@ -199,3 +197,10 @@ class PoseGraph:
         entries = np.append(blocks.ravel(), [_FIXED] * 3)
         places = np.append(row.ravel(), [0, 1, 2]), np.append(column.ravel(), [0, 1, 2])
         return csc_array((entries, places), shape=(len(b), len(b))), b, chi2
+
+
+def _moved(poses: Array, step: Array) -> Array:
+    """Poses (N, 3) after a step (N, 3)."""
+    after = poses + step
+    after[:, 2] = wrap(after[:, 2])
+    return after

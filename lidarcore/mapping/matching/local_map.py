@@ -130,9 +130,9 @@ class LocalMap:
     def is_chance(self, seen: Patches, guess: UncertainPose, registered: Registration) -> bool:
         """Whether a scan that contradicts the guess fits no better than that costs: some of it fits anywhere."""
         x, P = UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
-        contradiction = _contradiction(registered, x, information_of(P))
+        prior = information_of(P)
         worth = evidence(registered.inliers, len(seen.near.means))
-        return contradiction > DOUBTFUL and worth < loss(contradiction, DOUBTFUL) / 2
+        return _contradiction(registered, x, prior) > DOUBTFUL and worth < _cost(registered, x, prior) / 2
 
     def _refutes(self, scan: Scan, pose: Array, other: Array, count: int) -> bool:
         """Whether more of a scan contradicts a pose (3,) than another one, by more than two standard deviations.
@@ -169,13 +169,18 @@ def _likelihood(other: Registration, best: Registration, guess: Array, prior: Ar
     """Of another pose of n patches, if it fits worse than the best one by chance: beside 1 for the best one."""
     less = max(best.inliers - other.inliers, 0.0)
     variance = (2 - best.inliers - other.inliers) / n  # of two shares
-    surprise = [loss(_contradiction(one, guess, prior), DOUBTFUL) for one in (other, best)]
-    return float(np.exp(-(less**2 / variance + max(surprise[0] - surprise[1], 0.0)) / 2))
+    farther = max(_cost(other, guess, prior) - _cost(best, guess, prior), 0.0)
+    return float(np.exp(-(less**2 / variance + farther) / 2))
 
 
 def _worth(registered: Registration, n: int, guess: Array, prior: Array) -> float:
     """Log-likelihood of a pose: a patch of the n for each that fits, as in the search, less how far the guess is."""
-    return n * registered.inliers - loss(_contradiction(registered, guess, prior), DOUBTFUL) / 2
+    return n * registered.inliers - _cost(registered, guess, prior) / 2
+
+
+def _cost(registered: Registration, guess: Array, prior: Array) -> float:
+    """What it costs that a pose contradicts the guess (3,)."""
+    return float(loss(_contradiction(registered, guess, prior), DOUBTFUL))
 
 
 def _contradiction(registered: Registration, guess: Array, prior: Array) -> float:
