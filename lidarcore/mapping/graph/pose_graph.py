@@ -108,11 +108,11 @@ class PoseGraph:
         for _ in range(rounds):
             H, b, chi2 = self._linearised(poses, heat)
             solver = factor(H)
-            step = solver.solve(-b).reshape(-1, 3)
-            step[0] = 0.0
-            step = self._shortened(step, poses, heat)
+            whole = solver.solve(-b).reshape(-1, 3)
+            whole[0] = 0.0
+            step = self._shortened(whole, poses, heat)
             poses = _moved(poses, step)
-            if heat == 1 and np.abs(step).max() < tolerance:
+            if heat == 1 and (np.abs(whole).max() < tolerance or not step.any()):
                 break
             heat = max(1.0, heat / _COOLING)
         self._poses, self._recovery, self._settled = poses, Recovery(solver), len(self._ends)
