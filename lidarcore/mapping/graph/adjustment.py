@@ -42,8 +42,8 @@ def normal_equations(
     scale: float,
     unevenness: float,
     known: Known | None = None,
-) -> tuple[NormalEquations, int]:
-    """The normal equations at poses (K, 3), and how many cells were seen by several keyframes of one island (K,).
+) -> NormalEquations:
+    """The normal equations at poses (K, 3), by the cells that several keyframes of one island (K,) saw.
 
     The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
     Cells are parted where parts of the way are not known, seen from each other.
@@ -58,9 +58,9 @@ def normal_equations(
     K, G = len(poses), len(order)
     sums = Sums(np.zeros((K, 3, 3)), np.zeros((K, 3)), np.empty((G, 3, 2)), np.empty((G, 2), np.int64))
     groups = Groups(*np.empty((4, G)))
-    number, shared = sum_cells(turned, starts, poses, Noise(scale, unevenness**2), sums, groups)
-    information = _sparse(sums.D, sums.U[:number], sums.at[:number], shared)
-    return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups))), shared
+    number, lines = sum_cells(turned, starts, poses, Noise(scale, unevenness**2), sums, groups)
+    information = _sparse(sums.D, sums.U[:number], sums.at[:number], lines)
+    return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups)))
 
 
 def _straight(places: Array, normals: Array, variances: Array, size: float) -> Array:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 from scipy.sparse import csc_array, diags_array
+from scipy.special import chdtr
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import (
@@ -32,6 +33,7 @@ from lidarcore.mapping.matching.patches import Patches
 _FIXED = 1e12  # information of the first pose
 _SETTLED = 0.01  # mean square of a step, in variances of the poses, below which it changes nothing
 _LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
+_INNER = float(chdtr(3, _LARGEST) / chdtr(1, _LARGEST))  # mean of the other ones, times as expected
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,15 +121,15 @@ def refine(
     seen = _observations(scans, assumed**2)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
-        equations, cells = normal_equations(seen, poses, islands, size, scale, unevenness, known)
+        equations = normal_equations(seen, poses, islands, size, scale, unevenness, known)
         H, g = _with_steps(equations, poses, steps)
         step = factor(H).solve(-g)
         poses = poses + step.reshape(-1, 3)
         poses[:, 2] = wrap(poses[:, 2])
-        scale, unevenness = _measured(equations.groups, cells, len(poses))
+        scale, unevenness = _measured(equations.groups, len(poses))
         if -g @ step < _SETTLED * len(g):
             break
-    equations, _ = normal_equations(seen, poses, islands, size, scale, unevenness, known)
+    equations = normal_equations(seen, poses, islands, size, scale, unevenness, known)
     recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
     return Refined(poses, sweeps, _joined(known, len(poses)), scale, unevenness, recovery)
 
@@ -171,21 +173,30 @@ def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> 
     return csc_array(H + tied + diags_array(fixed)), g
 
 
-def _measured(groups: Groups, cells: int, keyframes: int) -> tuple[float, float]:
+def _measured(groups: Groups, keyframes: int) -> tuple[float, float]:
     """Factor of the noise's variance, and the standard deviation of what a group shares, from their residuals."""
-    free = 1 - 3 * keyframes / max(len(groups.squares) - 2 * cells, 3 * keyframes + 1)
     kept = (groups.left > 0.2) & (groups.near > 0)  # of the others' noise hardly anything is the ranges'
-    squares, noise = groups.squares[kept] / (groups.left[kept] * max(free, 0.2)), groups.variances[kept]
-    scale, shared = 1.0, 0.005**2
+    squares, noise = groups.squares[kept] / groups.left[kept], groups.variances[kept]
+    scale, shared, known = 1.0, 0.005**2, 0.0
     for _ in range(10):
+        known = _known(groups, scale * groups.variances + shared, known, keyframes)
         expected = scale * noise + shared
-        inner = squares < _LARGEST * expected
+        taken = known / (expected + known)
+        inner = squares < _LARGEST * expected * (1 - taken)
         # Each square as it is certain, and as much as it says about the poses: those count whose claims matter.
         weights = expected[inner] ** -1.5
         rows = np.stack([noise, np.ones(len(noise))], -1)[inner] * weights[:, None]
-        (scale, shared), _ = nnls(rows, squares[inner] * weights)
+        (scale, shared), _ = nnls(rows, (squares / _INNER + taken * expected)[inner] * weights)
         scale = max(scale, 0.01)
     return float(scale), float(np.sqrt(shared))
+
+
+def _known(groups: Groups, expected: Array, known: float, keyframes: int) -> float:
+    """Variance to which others know where a group lies: of what they leave, the poses' 3 K unknowns take 3 K shares.
+
+    A better one than the one given: a group moves poses as far as it weighs beside all the others.
+    """
+    return float(3 * keyframes / max((groups.left / (expected + known)).sum(), 1e-12))
 
 
 def turned(covariances: Array, headings: Array) -> Array:

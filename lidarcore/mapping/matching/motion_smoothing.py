@@ -45,13 +45,13 @@ class ScanMotion(NamedTuple):
     on: bool
 
     def stands(self, kept: float) -> Array:
-        """`sweep` with what it adds to a pose that has `kept` of the error of the place, where that is more.
+        """Covariance that `sweep` adds to a pose that has `kept` of the error of its place.
 
-        Places on either side of a scan tell its speed, but the first one's own place, wrong, makes its speed wrong.
+        A speed that is told by the place itself, wrong with it, makes the scan stand farther off, or less far.
         """
-        values, V = np.linalg.eigh(self.shared + self.shared.T)
-        more: Array = self.sweep + kept * (V * np.maximum(values, 0.0)) @ V.T
-        return more
+        values, V = np.linalg.eigh(self.sweep + kept * (self.shared + self.shared.T))
+        added: Array = (V * np.maximum(values, 0.0)) @ V.T
+        return added
 
 
 def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Array, list[ScanMotion]]:
