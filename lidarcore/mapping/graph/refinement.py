@@ -178,7 +178,7 @@ def _measured(groups: Groups, keyframes: int) -> tuple[float, float]:
     kept = (groups.left > 0.2) & (groups.near > 0)  # of the others' noise hardly anything is the ranges'
     squares, noise = groups.squares[kept] / groups.left[kept], groups.variances[kept]
     scale, shared, known = 1.0, 0.005**2, 0.0
-    for _ in range(10):
+    for _ in range(20):
         known = _known(groups, scale * groups.variances + shared, known, keyframes)
         expected = scale * noise + shared
         taken = known / (expected + known)

@@ -9,12 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
-from lidarcore.geometry import compose, inverse, left_of, relative, rotate
+from lidarcore.geometry import compose, inverse, relative, rotate
 from lidarcore.mapping.matching.jerk import Drive, Window, estimated
 from lidarcore.mapping.matching.sweep import PAUSE
 
 _SCANS = 7
 """Scans that tell a speed: as many at an end, where those nearest to it would not tell how steady the drive is."""
+_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])) / 2
+"""Of the integral of what is smooth from 0 to 1."""
 _ROUNDS = 3  # a wrong speed shifts scans, from which it is told: a tenth of it comes back
 
 
@@ -75,14 +77,15 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     variances = np.minimum(matched, [one.own for one in motions])
     laid = compose(poses, _covered(removed, h))
 
-    def around(means: Array) -> Window:
-        return Window.of(told, since, h, relative(means[:, None], means[there]), variances[there])
+    def around(means: Array, rates: Array) -> Window:
+        places = relative(means[:, None], means[there])
+        places[..., :2] -= _bend(rates, since)
+        return Window.of(told, since, h, places, variances[there])
 
-    drive = Drive.of(around(laid))
+    drive = Drive.of(around(laid, removed))
     means, shown = laid, removed
     for _ in range(_ROUNDS):
-        rates, spread, with_place = estimated(around(means), drive)
-        rates[:, 1, :2] -= rates[:, 0, 2:] * left_of(rates[:, 0, :2])  # as the sensor has them, which turns
+        rates, spread, with_place = estimated(around(means, shown), drive)
         shown = np.where(known[:, None, None], rates, removed)
         means = compose(laid, np.einsum("tijk,tik->tj", shift, shown - removed))
     now = np.where(known[:, None], compose(means, inverse(_covered(shown, h))), poses)
@@ -112,6 +115,19 @@ def _beside(stamps: Array) -> tuple[Ints, Bools]:
     begin = np.maximum(np.minimum(np.arange(len(stamps)) - _SCANS // 2, end - _SCANS), first)
     at = begin[:, None] + np.arange(_SCANS)
     return np.minimum(at, len(stamps) - 1), at < end[:, None]
+
+
+def _bend(rates: Array, t: Array) -> Array:
+    """How far (T, K, 2) m a sensor comes to lie aside by times t (T, K) s because it turns, as it sees it at 0 s.
+
+    rates (T, 2, 3) are velocities and accelerations as it has them: without that, a steady turn would pass for jerks.
+    """
+    velocity, acceleration = rates[:, None, None, 0], rates[:, None, None, 1]
+    since = t[..., None, None] * _NODES[:, None]
+    moving = velocity + since * acceleration
+    turned = (velocity + since / 2 * acceleration)[..., 2] * since[..., 0]
+    aside: Array = (rotate(turned, moving[..., :2]) - moving[..., :2]) * t[..., None, None]
+    return np.einsum("tkni,n->tki", aside, _WEIGHTS)
 
 
 def _covered(rates: Array, h: Array) -> Array:
