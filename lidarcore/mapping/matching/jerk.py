@@ -13,7 +13,7 @@ from lidarcore.arrays import Array, Bools
 
 _PRIOR = np.array([[1.0, 10.0, 1.0], [1.0, 10.0, 1.0], [1.0, 10.0, 2.0]])[..., None] ** 2 * np.eye(3)
 """(3, 3, 3) covariances of place, speed and acceleration in m and rad, before any place says anything."""
-_JERKS = np.array([0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
+_JERKS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
 """What may change an acceleration within a second, from the steadiest drive to the jerkiest: m/s², m/s², rad/s²."""
 _NOISES = 2.0 ** np.arange(3, -8, -0.5)
 """Times the variances of places, which their noise may really have."""

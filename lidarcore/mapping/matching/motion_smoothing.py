@@ -15,8 +15,6 @@ from lidarcore.mapping.matching.sweep import PAUSE
 
 _SCANS = 7
 """Scans that tell a speed: as many at an end, where those nearest to it would not tell how steady the drive is."""
-_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])) / 2
-"""Of the integral of what is smooth from 0 to 1."""
 _ROUNDS = 3  # a wrong speed shifts scans, from which it is told: a tenth of it comes back
 
 
@@ -78,9 +76,8 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     laid = compose(poses, _covered(removed, h))
 
     def around(means: Array, rates: Array) -> Window:
-        places = relative(means[:, None], means[there])
-        places[..., :2] -= _bend(rates, since)
-        return Window.of(told, since, h, places, variances[there])
+        straight = _unrolled(means, rates[:, 0, 2], stamps + h[:, 0], on)
+        return Window.of(told, since, h, straight[there] - straight[:, None], variances[there])
 
     drive = Drive.of(around(laid, removed))
     means, shown = laid, removed
@@ -117,17 +114,21 @@ def _beside(stamps: Array) -> tuple[Ints, Bools]:
     return np.minimum(at, len(stamps) - 1), at < end[:, None]
 
 
-def _bend(rates: Array, t: Array) -> Array:
-    """How far (T, K, 2) m a sensor comes to lie aside by times t (T, K) s because it turns, as it sees it at 0 s.
+def _unrolled(poses: Array, rates: Array, times: Array, on: Bools) -> Array:
+    """Places (T, 3) of a sensor as if it had not turned, each step as it saw it lie ahead and to the left: else, where it
+    goes round a curve, a steady speed would pass for one that changes. Those that are not `on` count for nothing.
 
-    rates (T, 2, 3) are velocities and accelerations as it has them: without that, a steady turn would pass for jerks.
+    Headings go from pose to pose (T, 3) as times (T,) s and turn rates (T,) rad/s say (cubic Hermite).
     """
-    velocity, acceleration = rates[:, None, None, 0], rates[:, None, None, 1]
-    since = t[..., None, None] * _NODES[:, None]
-    moving = velocity + since * acceleration
-    turned = (velocity + since / 2 * acceleration)[..., 2] * since[..., 0]
-    aside: Array = (rotate(turned, moving[..., :2]) - moving[..., :2]) * t[..., None, None]
-    return np.einsum("tkni,n->tki", aside, _WEIGHTS)
+    k = np.flatnonzero(on)
+    steps = relative(poses[k[:-1]], poses[k[1:]])
+    turned = steps[:, 2] / 2 - np.diff(times[k]) * np.diff(rates[k]) / 12  # on average, on the way
+    ahead = rotate(-turned, steps[:, :2]) / np.sinc(
+        steps[:, 2:] / (2 * np.pi)
+    )  # an arc is longer than its chord
+    straight = np.zeros(poses.shape)
+    straight[k[1:]] = np.cumsum(np.concatenate([ahead, steps[:, 2:]], 1), axis=0)
+    return straight
 
 
 def _covered(rates: Array, h: Array) -> Array:
