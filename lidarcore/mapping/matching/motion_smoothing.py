@@ -115,17 +115,16 @@ def _beside(stamps: Array) -> tuple[Ints, Bools]:
 
 
 def _unrolled(poses: Array, rates: Array, times: Array, on: Bools) -> Array:
-    """Places (T, 3) of a sensor as if it had not turned, each step as it saw it lie ahead and to the left: else, where it
-    goes round a curve, a steady speed would pass for one that changes. Those that are not `on` count for nothing.
+    """Places (T, 3) as if the sensor had not turned, each step as it saw it lie ahead and to the left.
 
-    Headings go from pose to pose (T, 3) as times (T,) s and turn rates (T,) rad/s say (cubic Hermite).
+    Else, where it goes round a curve, a steady speed would pass for one that changes. Between poses (T, 3), headings
+    follow from times (T,) s and turn rates (T,) rad/s (cubic Hermite). Poses that are not `on` count for nothing.
     """
     k = np.flatnonzero(on)
     steps = relative(poses[k[:-1]], poses[k[1:]])
-    turned = steps[:, 2] / 2 - np.diff(times[k]) * np.diff(rates[k]) / 12  # on average, on the way
-    ahead = rotate(-turned, steps[:, :2]) / np.sinc(
-        steps[:, 2:] / (2 * np.pi)
-    )  # an arc is longer than its chord
+    mean = steps[:, 2] / 2 - np.diff(times[k]) * np.diff(rates[k]) / 12  # heading on the way
+    longer = 1 / np.sinc(steps[:, 2:] / (2 * np.pi))  # an arc than its chord
+    ahead = longer * rotate(-mean, steps[:, :2])
     straight = np.zeros(poses.shape)
     straight[k[1:]] = np.cumsum(np.concatenate([ahead, steps[:, 2:]], 1), axis=0)
     return straight
