@@ -10,6 +10,7 @@ from lidarcore.mapping.matching.local_map import LocalMap
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.registration import Registration
 from lidarcore.simulation import World, furnished_room
+from lidarcore.simulation.rooms import rectangular_room
 
 TURNED = 0.15  # rad, standard deviation of what wheels say
 TOOTH = 2 * np.pi / 50  # rad
@@ -69,3 +70,16 @@ def test_a_scan_that_sees_nothing_near_says_nothing_of_other_ways():
     nothing = patches(Scan(np.full(9, np.nan), np.linspace(0, 1, 9)), SETTINGS.front.match)
     found = Registration(np.array([0.0, 0.0, 0.5]), 1e4 * np.eye(3), 0.5)
     assert np.array_equal(local.scatter(nothing, guess, found), np.zeros((3, 3)))
+
+
+def test_a_corridor_that_looks_the_same_both_ways_leaves_no_heading_as_vague_as_half_a_turn():
+    """Without odometry a guess leaves the heading open: half a turn away is another place, and not a vague heading."""
+    rng, world = np.random.default_rng(4), rectangular_room(60, 2.4)
+    before, after = (full_scan(world, np.array([x, 0.0, 0.0]), NOISE, rng) for x in (0.0, 1.0))
+    match = SETTINGS.front.match
+    local, seen = LocalMap(SETTINGS.front), patches(after, match)
+    local.add(before, patches(before, match))
+    guess = UncertainPose(np.array([1.0, 0.0, 0.0]), np.diag([0.5, 0.5, 2.5]) ** 2)
+    at = local.registered(after, seen, guess)
+    less_sure = at._replace(inliers=0.9)  # as if some of what it shows were new
+    assert np.sqrt(local.scatter(seen, guess, less_sure)[2, 2]) < 0.05

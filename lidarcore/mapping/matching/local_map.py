@@ -110,14 +110,16 @@ class LocalMap:
         """(3, 3) of how far from where it was registered a scan fits as well, or worse only by chance.
 
         A scan of few beams that shows much new fits in several ways, some degrees apart: registered from either side,
-        as far as the guess leaves its heading open, it comes to lie elsewhere.
+        as far as the guess leaves its heading open, it comes to lie elsewhere. What lies farther apart is another place:
+        a corridor looks the same both ways.
         """
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         sigma, prior, near = np.sqrt(np.diagonal(P)), information_of(P), seen.near.means
         spread, total = np.zeros((3, 3)), 1.0
         if len(near) < BLIND or not _is_vague(sigma, near) or registered.inliers + _BETTER >= 1:
             return spread
-        for turn in (-sigma[2], sigma[2]):
+        turned = min(sigma[2], _TURNED)
+        for turn in (-turned, turned):
             start = registered.pose + np.array([0.0, 0.0, turn])
             other = register(self._surfels, seen, start, x, prior, match.reach)
             off = pose_difference(other.pose, registered.pose)
