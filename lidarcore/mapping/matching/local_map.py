@@ -110,8 +110,8 @@ class LocalMap:
         """(3, 3) of how far from where it was registered a scan fits as well, or worse only by chance.
 
         A scan of few beams that shows much new fits in several ways, some degrees apart: registered from either side,
-        as far as the guess leaves its heading open, it comes to lie elsewhere. What lies farther apart is another place:
-        a corridor looks the same both ways.
+        as far as the guess leaves its heading open, it comes to lie elsewhere. What lies farther apart is another
+        place: a corridor looks the same both ways.
         """
         match, (x, P) = self._settings.match, UncertainPose(self._anchor, np.zeros((3, 3))).compose(guess)
         sigma, prior, near = np.sqrt(np.diagonal(P)), information_of(P), seen.near.means
