@@ -13,7 +13,6 @@ from scipy.sparse.csgraph import connected_components
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import LocalizationError
 from lidarcore.geometry import UncertainPose, as_pose_covariance, relative_jacobians, wrap
-from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.localization.ekf.estimate import as_pose
 from lidarcore.mapping.doubt import DOUBTFUL, loss
 from lidarcore.mapping.graph.edges import edge_errors, linearise
@@ -142,11 +141,7 @@ class PoseGraph:
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j (3,) as the graph has it now, and its covariance (3, 3)."""
-        block = self._recovered.block
-        found = relative_with_covariance(
-            self._poses[i], self._poses[j], block(i, i), block(i, j), block(j, j)
-        )
-        return UncertainPose(*found)
+        return self._recovered.relative(i, j, self._poses)
 
     def covariances(self) -> Array:
         """(N, 3, 3): covariance of the pose of each node, given node 0."""

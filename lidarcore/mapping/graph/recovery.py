@@ -6,8 +6,11 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
+from lidarcore.geometry import UncertainPose, relative_jacobians
+from lidarcore.geometry.kernels import relative_with_covariance
 
 _KEPT = 3_000_000  # rows of three columns each: 72 MB
+_DIGITS = 1e-8  # share of a covariance that is left of it with at least three digits
 
 
 class Recovery:
@@ -48,6 +51,27 @@ class Recovery:
         before, shared = self._tail[j - self._count]
         found: Array = moves @ np.linalg.solve(before, shared)
         return found
+
+    def relative(self, i: int, j: int, poses: Array) -> UncertainPose:
+        """T_i_j of the nodes, whose poses are (N, 3), with its covariance.
+
+        Where both lie so vaguely that the difference of their blocks has no digits left, what ties them is solved for.
+        """
+        own, other = self.block(i, i), self.block(j, j)
+        pose, P = relative_with_covariance(poses[i], poses[j], own, self.block(i, j), other)
+        if max(i, j) < self._count and P.trace() < _DIGITS * (own.trace() + other.trace()):
+            P = self._tied(i, j, *relative_jacobians(poses[i], poses[j]))
+        return UncertainPose(pose, P)
+
+    def _tied(self, i: int, j: int, A: Array, B: Array) -> Array:
+        """Covariance (3, 3) of A times what node i is off, with B times what node j is."""
+        first, second = (slice(3 * k, 3 * k + 3) for k in (i, j))
+        J = np.zeros((self._factor.shape[0], 3))
+        J[first] += A.T
+        J[second] += B.T
+        solved = self._factor.solve(J)
+        P: Array = A @ solved[first] + B @ solved[second]
+        return (P + P.T) / 2
 
     def diagonal(self) -> Array:
         """(N, 3, 3): covariance of each node."""

@@ -33,7 +33,7 @@ from lidarcore.mapping.matching.patches import Patches
 _FIXED = 1e12  # information of the first pose
 _SETTLED = 0.01  # mean square of a step, in variances of the poses, below which it changes nothing
 _LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
-_INNER = float(chdtr(3, _LARGEST) / chdtr(1, _LARGEST))  # mean of the other ones, times as expected
+_INNER = float(chdtr(3, _LARGEST) / chdtr(1, _LARGEST))  # times as expected the mean square of the others is
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,14 +86,10 @@ class Refined:
 
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j with its covariance."""
-        mixed = self._recovery.block(i, j)
-        found = relative_with_covariance(self.poses[i], self.poses[j], self._own(i), mixed, self._own(j))
-        return UncertainPose(*found)
-
-    def _own(self, i: int) -> Array:
-        """Covariance (3, 3) of pose i itself."""
-        block: Array = self._recovery.block(i, i) + turned(self.sweeps[i], self.poses[i, 2])
-        return block
+        pose, P = self._recovery.relative(i, j, self.poses)
+        own_i, own_j = (turned(self.sweeps[k], self.poses[k, 2]) for k in (i, j))
+        _, apart = relative_with_covariance(self.poses[i], self.poses[j], own_i, np.zeros((3, 3)), own_j)
+        return UncertainPose(pose, P + apart)
 
 
 def refine(
@@ -177,11 +173,11 @@ def _measured(groups: Groups, keyframes: int) -> tuple[float, float]:
     """Factor of the noise's variance, and the standard deviation of what a group shares, from their residuals."""
     kept = (groups.left > 0.2) & (groups.near > 0)  # of the others' noise hardly anything is the ranges'
     squares, noise = groups.squares[kept] / groups.left[kept], groups.variances[kept]
-    scale, shared, known = 1.0, 0.005**2, 0.0
+    scale, shared, told = 1.0, 0.005**2, 0.0
     for _ in range(20):
-        known = _known(groups, scale * groups.variances + shared, known, keyframes)
+        told = _told(groups, scale * groups.variances + shared, told, keyframes)
         expected = scale * noise + shared
-        taken = known / (expected + known)
+        taken = told / (expected + told)
         inner = squares < _LARGEST * expected * (1 - taken)
         # Each square as it is certain, and as much as it says about the poses: those count whose claims matter.
         weights = expected[inner] ** -1.5
@@ -191,12 +187,13 @@ def _measured(groups: Groups, keyframes: int) -> tuple[float, float]:
     return float(scale), float(np.sqrt(shared))
 
 
-def _known(groups: Groups, expected: Array, known: float, keyframes: int) -> float:
-    """Variance to which others know where a group lies: of what they leave, the poses' 3 K unknowns take 3 K shares.
+def _told(groups: Groups, expected: Array, told: float, keyframes: int) -> float:
+    """Variance to which all others tell where a group lies, better than the one `told` before.
 
-    A better one than the one given: a group moves poses as far as it weighs beside all the others.
+    Of what lines leave, the 3 K unknowns of the poses take 3 K shares: each group moves them as far as it weighs beside
+    all the others.
     """
-    return float(3 * keyframes / max((groups.left / (expected + known)).sum(), 1e-12))
+    return float(3 * keyframes / max((groups.left / (expected + told)).sum(), 1e-12))
 
 
 def turned(covariances: Array, headings: Array) -> Array:
