@@ -15,7 +15,7 @@ from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.keyframes import Keyframes
 from lidarcore.mapping.matching.distortion import half_time, own_variances, pose_shift
 from lidarcore.mapping.matching.front import FrontEnd
-from lidarcore.mapping.matching.motion_smoothing import ScanMotion, smoothed
+from lidarcore.mapping.matching.motion_smoothing import UNTOLD, ScanMotion, smoothed, with_distortion
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
@@ -97,11 +97,21 @@ class Mapper:
             if not self._back.search_beside():
                 break
         refined = self._back.refine()
+        if any(motion.half > 0 for motion in self._motions):
+            self._take_distortion(refined)
+            self._smooth_motion()
+            refined = self._back.refine()
         of_keyframes = [self._motions[number] for number in self._numbers]
         scatter = np.array([motion.scatter for motion in of_keyframes])
         share = kept(refined, np.array(self._locals), scatter)
         self._refined = replace(refined, sweeps=np.array([motion.stands(share) for motion in of_keyframes]))
         self._loops = len(self._back.loops)
+
+    def _take_distortion(self, refined: Refined) -> None:
+        """Let motions know what the surfaces that keyframes see again say of them."""
+        motions = with_distortion([self._motions[number] for number in self._numbers], refined.speeds)
+        for number, motion in zip(self._numbers, motions, strict=True):
+            self._motions[number] = motion
 
     def _smooth_motion(self) -> None:
         """Take out of the scans the motion that all of them show; what hangs on keyframes moves with them."""
@@ -207,6 +217,7 @@ def _motion_of(tracked: Tracked) -> ScanMotion:
         velocity=tracked.velocity,
         acceleration=np.zeros(3),
         variances=variances,
+        distorted=UNTOLD,
         own=own_variances(tracked.patches),
         scatter=variances,
         sweep=tracked.sweep,

@@ -106,6 +106,6 @@ def test_what_the_map_keeps_of_errors_is_told_by_keyframes_that_surfaces_tie(joi
     ]
     scatter = np.full((4, 3), 0.1**2 / 2)
     recovery = Recovery(factor(csc_array(np.eye(12))))
-    refined = Refined(poses, np.zeros((4, 3, 3)), np.array(joined), 1.0, 0.0, recovery)
+    refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), 1.0, 0.0, recovery)
     found = kept(refined, local, scatter)
     assert found == pytest.approx(1 - (2 / 3 if any(joined) else 1) / 2)

@@ -6,17 +6,23 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 
 from lidarcore.mapping.matching.jerk import _JERKS, Drive, Window, _wander, estimated
+from lidarcore.mapping.matching.motion_smoothing import UNTOLD
 
 T = np.arange(-3, 4) / 10
 SIGMA = np.array([1e-3, 2e-3, 5e-4])
 
 
-def window(places, variances=SIGMA**2, h=0.0, told=None):
+def window(places, variances=SIGMA**2, h=0.0, told=None, speeds=UNTOLD):
     """Around the middle of seven places (N, 7, 3), a tenth of a second apart."""
     n = len(places)
     told = np.ones((n, 7), bool) if told is None else told
     return Window.of(
-        told, np.tile(T, (n, 1)), np.full((n, 1), h), places, np.broadcast_to(variances, places.shape)
+        told,
+        np.tile(T, (n, 1)),
+        np.full((n, 1), h),
+        places,
+        np.broadcast_to(variances, places.shape),
+        np.broadcast_to(speeds, (n, 2, 3)),
     )
 
 
@@ -66,6 +72,21 @@ def test_one_density_gives_what_a_kalman_filter_forth_and_back_gives(number):
         m, P = fused(places[0, :, d], SIGMA[d] ** 2, jerk[d], [1, 10, (1, 1, 2)[d]])
         np.testing.assert_allclose(rates[0, :, d], m[1:], rtol=1e-5, atol=1e-7)
         np.testing.assert_allclose(C[0, d], P[1:, 1:], rtol=1e-4, atol=1e-9)
+
+
+def test_a_speed_that_is_told_besides_counts_as_one_more_measurement():
+    """Of a scale to matter: as certain as the places make it, and 20 mm/s and 10 mrad/s off what they say."""
+    rng, jerk, number = np.random.default_rng(3), _JERKS[2], 2
+    places = rng.normal(0, 0.002, (1, 7, 3)) + np.stack([0.7 * T, -0.1 * T**2, 0.4 * T], -1)
+    without, before, _ = estimated(window(places), only(number))
+    speed, variances = without[0, 0] + [0.02, 0.02, -0.01], before[0, :, 0, 0]
+    rates, C, _ = estimated(window(places, speeds=np.stack([speed, variances])), only(number))
+    for d in range(3):
+        m, P = fused(places[0, :, d], SIGMA[d] ** 2, jerk[d], [1, 10, (1, 1, 2)[d]])
+        gain = P[:, 1] / (P[1, 1] + variances[d])
+        np.testing.assert_allclose(rates[0, :, d], (m + gain * (speed[d] - m[1]))[1:], rtol=1e-5, atol=1e-7)
+        np.testing.assert_allclose(C[0, d], (P - np.outer(gain, P[1]))[1:, 1:], rtol=1e-4, atol=1e-9)
+    assert (np.abs(rates - without)[0, 0] > 0.004).all()
 
 
 def fused(y, variance, jerk, usual):

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import rotate
+from lidarcore.geometry import rotate, rotation
 from lidarcore.mapping.cells import cells
 from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells
 from lidarcore.mapping.graph.known import Known, parted
@@ -20,6 +20,10 @@ _GAP = 0.15  # m between two surfaces side by side
 _WITHIN = 0.03  # m by which the returns of a patch scatter along it
 _STRETCH = 4  # cells, of which a line tells the direction of the surface better than each of them
 _BEYOND = 1e6  # m between two islands
+_VAGUE_POSE, _VAGUE_SPEED = (
+    (1.0, 1.0, 1.0),
+    (0.01, 0.01, 0.01),
+)  # 1/m² or 1/rad², s² times that: what no surface tells
 
 
 class NormalEquations(NamedTuple):
@@ -48,19 +52,65 @@ def normal_equations(
     The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
     Cells are parted where parts of the way are not known, seen from each other.
     """
+    sums, groups, lines = _summed(seen, poses, islands, size, Noise(scale, unevenness**2), known, 3)
+    return NormalEquations(_sparse(sums.D, sums.U, sums.at, lines), sums.g.ravel(), groups)
+
+
+def speeds_left(
+    seen: Observations,
+    poses: Array,
+    islands: Ints,
+    size: float,
+    scale: float,
+    unevenness: float,
+    known: Known | None = None,
+) -> Array:
+    """How much faster the sensor moved, m/s ahead, m/s to the left and rad/s, than was taken out of each scan, and the
+    variances of that: (K, 2, 3).
+
+    A scan that is still distorted does not lie on what others saw of the same surfaces, wherever it is put. Arguments
+    are those of `normal_equations`, at poses that solve them.
+    """
+    sums, _, _ = _summed(seen, poses, islands, size, Noise(scale, unevenness**2), known, 6)
+    H = sums.D + np.diag([*_VAGUE_POSE, *_VAGUE_SPEED])
+    np.add.at(H, sums.at[:, 0], -sums.U @ sums.U.mT)
+    turn = np.zeros((len(poses), 6, 6))
+    turn[:, [2, 5], [2, 5]] = 1.0
+    turn[:, :2, :2] = turn[:, 3:5, 3:5] = rotation(poses[:, 2])
+    H, g = turn.mT @ H @ turn, turn.mT @ sums.g[..., None]
+    P = np.linalg.inv(H)
+    faster = -(P @ g)[:, 3:, 0]
+    return np.stack([faster, np.diagonal(P, axis1=1, axis2=2)[:, 3:]], 1)
+
+
+def _summed(
+    seen: Observations,
+    poses: Array,
+    islands: Ints,
+    size: float,
+    noise: Noise,
+    known: Known | None,
+    unknowns: int,
+) -> tuple[Sums, Groups, int]:
+    """What all groups add up to, with so many unknowns for each keyframe; what is left of them; number of lines."""
     arms, normals = (rotate(poses[seen.keyframes, 2], v) for v in (seen.means, seen.normals))
     places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
     order, starts = _ordered(places, normals, size, seen.keyframes, known)
     normals = _straight(places, normals, seen.variances, size)
     turned = Observations(
-        seen.keyframes[order], arms[order], normals[order], seen.variances[order], seen.near[order]
+        seen.keyframes[order],
+        arms[order],
+        normals[order],
+        seen.variances[order],
+        seen.near[order],
+        seen.since[order],
     )
-    K, G = len(poses), len(order)
-    sums = Sums(np.zeros((K, 3, 3)), np.zeros((K, 3)), np.empty((G, 3, 2)), np.empty((G, 2), np.int64))
+    K, G, n = len(poses), len(order), unknowns
+    sums = Sums(np.zeros((K, n, n)), np.zeros((K, n)), np.empty((G, n, 2)), np.empty((G, 2), np.int64))
     groups = Groups(*np.empty((4, G)))
-    number, lines = sum_cells(turned, starts, poses, Noise(scale, unevenness**2), sums, groups)
-    information = _sparse(sums.D, sums.U[:number], sums.at[:number], lines)
-    return NormalEquations(information, sums.g.ravel(), Groups(*(v[:number] for v in groups)))
+    number, lines = sum_cells(turned, starts, poses, noise, sums, groups)
+    sums = sums._replace(U=sums.U[:number], at=sums.at[:number])
+    return sums, Groups(*(v[:number] for v in groups)), lines
 
 
 def _straight(places: Array, normals: Array, variances: Array, size: float) -> Array:

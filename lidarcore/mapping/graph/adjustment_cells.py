@@ -21,6 +21,7 @@ class Observations(NamedTuple):
     normals    (M, 2)
     variances  (M,) m² of noise
     near       (M,) whether returns near each other make it, see Patches.counts
+    since      (M,) s from the mean time of its keyframe's beams until it was seen
     """
 
     keyframes: Ints
@@ -28,6 +29,7 @@ class Observations(NamedTuple):
     normals: Array
     variances: Array
     near: Bools
+    since: Array
 
 
 class Groups(NamedTuple):
@@ -55,7 +57,8 @@ class Noise(NamedTuple):
 class Sums(NamedTuple):
     """What the G groups of K keyframes add up to: D - U U^T is the information, U's columns are those of the lines.
 
-    D (K, 3, 3), g (K, 3); U (G, 3, 2) with keyframe and line of each, at (G, 2).
+    D (K, n, n), g (K, n); U (G, n, 2) with keyframe and line of each, at (G, 2). With n = 3 it is that of poses, with
+    n = 6 that of poses and of how much faster, m/s, m/s, rad/s in the map, the sensor moved than was taken out.
     """
 
     D: Array
@@ -79,8 +82,8 @@ def sum_cells(
     """Adds up the cells that several keyframes saw, patches turned as the map is; the number of groups and of cells."""
     keyframes, arms, variances = turned.keyframes, turned.means, turned.variances
     D, g, U, at = sums.D, sums.g, sums.U, sums.at
-    number, lines = 0, 0
-    N, m, S = np.empty((2, 2)), np.empty(2), np.empty((3, 2))
+    number, lines, n = 0, 0, D.shape[1]
+    N, m, S, J = np.empty((2, 2)), np.empty(2), np.empty((n, 2)), np.empty(n)
     r, t, weights = np.empty(len(keyframes)), np.empty(len(keyframes)), np.empty(len(keyframes))
     scratch = _Scratch(r, t, weights)
     for cell in range(len(starts) - 1):
@@ -104,19 +107,21 @@ def sum_cells(
             mean, information, lever, total = 0.0, 0.0, 0.0, 0.0
             while j < high and keyframes[j] == k:
                 w, left = weights[j], r[j] - a - b * t[j]
-                J = nx, ny, ny * arms[j, 0] - nx * arms[j, 1]
-                for p in range(3):
+                J[0], J[1], J[2] = nx, ny, ny * arms[j, 0] - nx * arms[j, 1]
+                for p in range(3, n):
+                    J[p] = turned.since[j] * J[p - 3]
+                for p in range(n):
                     g[k, p] += w * J[p] * left
                     S[p, 0] += w * J[p]
                     S[p, 1] += w * J[p] * t[j]
-                    for q in range(3):
+                    for q in range(n):
                         D[k, p, q] += w * J[p] * J[q]
                 mean += left / variances[j]
                 information += 1 / variances[j]
                 lever += w * t[j]
                 total += w
                 j += 1
-            for p in range(3):
+            for p in range(n):
                 U[number, p, 0] = S[p, 0] * l00 + S[p, 1] * l10
                 U[number, p, 1] = S[p, 1] * l11
             at[number, 0], at[number, 1] = k, lines

@@ -24,7 +24,7 @@ from lidarcore.geometry import (
     wrap,
 )
 from lidarcore.geometry.kernels import relative_with_covariance
-from lidarcore.mapping.graph.adjustment import NormalEquations, normal_equations
+from lidarcore.mapping.graph.adjustment import NormalEquations, normal_equations, speeds_left
 from lidarcore.mapping.graph.adjustment_cells import Groups, Observations
 from lidarcore.mapping.graph.known import Known
 from lidarcore.mapping.graph.recovery import Recovery, factor
@@ -51,6 +51,7 @@ class Refined:
     """Poses (K, 3) with their joint covariance; and what was measured of the surfaces.
 
     sweeps      (K, 3, 3) covariance that each pose has besides, seen from itself: of where its scan stands
+    speeds      (K, 2, 3) m/s, m/s, rad/s that the sensor moved faster than was taken out of each scan, with variances
     joined      (K - 1,) whether surfaces tie a keyframe to the next one; else only the step between them does
     scale       times the patches' own variances, which noise really has
     unevenness  m, standard deviation that all patches of one view of one place share
@@ -58,6 +59,7 @@ class Refined:
 
     poses: Array
     sweeps: Array
+    speeds: Array
     joined: Bools
     scale: float
     unevenness: float
@@ -99,6 +101,7 @@ def refine(
     size: float,
     islands: Ints | None = None,
     sweeps: Array | None = None,
+    since: list[Array] | None = None,
     assumed: float = 0.0,
     known: Known | None = None,
     rounds: int = 12,
@@ -107,6 +110,7 @@ def refine(
 
     islands (K,) number what each pose is right to: surfaces seen from different islands are different ones.
     sweeps (K, 3, 3) are covariances of where each scan stands beside its pose; they move nothing.
+    since are times (N,) s from the mean time of each scan's beams until its patches were seen; None: all at once.
     assumed m is the unevenness that the patches' variances contain: it is measured here, and would count twice.
     known tells which parts of the way may be taken to have seen the same surfaces; None: all.
     steps tie keyframes by what is known where surfaces say nothing: by odometry or the going on of the motion, and by
@@ -114,7 +118,7 @@ def refine(
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
-    seen = _observations(scans, assumed**2)
+    seen = _observations(scans, since, assumed**2)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
         equations = normal_equations(seen, poses, islands, size, scale, unevenness, known)
@@ -127,7 +131,8 @@ def refine(
             break
     equations = normal_equations(seen, poses, islands, size, scale, unevenness, known)
     recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
-    return Refined(poses, sweeps, _joined(known, len(poses)), scale, unevenness, recovery)
+    speeds = speeds_left(seen, poses, islands, size, scale, unevenness, known)
+    return Refined(poses, sweeps, speeds, _joined(known, len(poses)), scale, unevenness, recovery)
 
 
 def _joined(known: Known | None, keyframes: int) -> Bools:
@@ -138,14 +143,16 @@ def _joined(known: Known | None, keyframes: int) -> Bools:
     return found
 
 
-def _observations(scans: list[Patches], assumed: float) -> Observations:
+def _observations(scans: list[Patches], since: list[Array] | None, assumed: float) -> Observations:
     """All patches, with the variance of noise alone: that of unevenness, m², is taken out."""
     numbers = np.repeat(np.arange(len(scans)), [len(scan.means) for scan in scans])
     columns = zip(
         *((scan.means, scan.normals, scan.variances - assumed, scan.counts > 0) for scan in scans),
         strict=True,
     )
-    return Observations(numbers, *(np.concatenate(column) for column in columns))
+    times = np.zeros(len(numbers)) if since is None else np.concatenate(since)
+    means, normals, variances, near = (np.concatenate(column) for column in columns)
+    return Observations(numbers, means, normals, variances, near, times)
 
 
 def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> tuple[csc_array, Array]:

@@ -15,6 +15,7 @@ from lidarcore.mapping.loops.islands import Islands, moved
 from lidarcore.mapping.loops.keyframes import Keyframe, View
 from lidarcore.mapping.loops.steps import Steps
 from lidarcore.mapping.loops.thinning import spare
+from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.sight import sight
 from lidarcore.mapping.matching.sweep import without
@@ -158,6 +159,7 @@ class BackEnd:
             self._settings.cell,
             self._islands.numbers,
             np.array(sweeps),
+            [seen_since(keyframe.scan, keyframe.patches) for keyframe in self.keyframes.values()],
             match.unevenness,
             parts,
         )

@@ -23,16 +23,23 @@ def pose_shift(scan: Scan, seen: Patches) -> Array:
     the same of the pose, that cancels; walls on one side only, or nearer on one side, do not let it.
     """
     shift = np.zeros((2, 3, 3))
-    if scan.beam_times is None or not is_swept(scan) or not len(seen.means):
+    if not is_swept(scan) or not len(seen.means):
         return shift
-    order = np.argsort(scan.bearings)
-    h = half_time(scan)
-    bearings = np.arctan2(seen.means[:, 1], seen.means[:, 0])
-    t = np.interp(bearings, scan.bearings[order], scan.beam_times[order]) - h
+    h, t = half_time(scan), seen_since(scan, seen)
     A, W, H = _equations(seen)
     for degree, bend in enumerate((t, t**2 / 2 - h**2 / 6)):
         shift[degree] = -np.linalg.solve(H, W.T @ (bend[:, None] * A))
     return shift
+
+
+def seen_since(scan: Scan, seen: Patches) -> Array:
+    """Times (N,) s from the mean time of a scan's beams until each patch was seen; 0 if they are not known."""
+    if scan.beam_times is None or not is_swept(scan):
+        return np.zeros(len(seen.means))
+    order = np.argsort(scan.bearings)
+    bearings = np.arctan2(seen.means[:, 1], seen.means[:, 0])
+    since: Array = np.interp(bearings, scan.bearings[order], scan.beam_times[order]) - half_time(scan)
+    return since
 
 
 def own_variances(seen: Patches) -> Array:

@@ -23,29 +23,42 @@ _ROUNDS = 20  # of expectation maximisation
 
 
 class Window(NamedTuple):
-    """K places around each of T times, one of them at the time itself; each dimension on its own.
+    """K - 1 places around each of T times, one of them at the time itself, and the speed then; each dimension alone.
 
     basis   (T, 1, K, 3) of place, speed and acceleration at the time
     noise   (T, 3, K, K) covariance of the places
+    doubt   (T, 3, K, K) variance of the speed
     wander  (T, 1, K, K) covariance of where white jerk of density 1 has led
-    places  (T, 3, K, 1) m, m, rad
+    told    (T, 3, K, 1) m, m, rad; the speed, in these per second, is the last one
     own     (T, 1, K) 1 for the place at the time itself, 0 for the others
     """
 
     basis: Array
     noise: Array
+    doubt: Array
     wander: Array
-    places: Array
+    told: Array
     own: Array
 
     @classmethod
-    def of(cls, told: Bools, t: Array, h: Array, places: Array, variances: Array) -> "Window":
-        """Places (T, K, 3) around t (T, K) s, each the mean over h (T, 1) s before and after; some may not be told."""
+    def of(cls, told: Bools, t: Array, h: Array, places: Array, variances: Array, speeds: Array) -> "Window":
+        """Places (T, K, 3) around t (T, K) s, each the mean over h (T, 1) s before and after; some may not be told.
+
+        speeds (T, 2, 3) are those at the times, with their variances.
+        """
         basis = np.stack([np.ones_like(t), t, t**2 / 2 + h**2 / 6], -1) * told[..., None]
-        noise = np.swapaxes(np.where(told[..., None], variances, 1.0), 1, 2)[..., None] * np.eye(t.shape[1])
-        given = np.swapaxes(np.where(told[..., None], places, 0.0), 1, 2)[..., None]
-        own = np.where(t == 0, 1.0, 0.0)[:, None]
-        return cls(basis[:, None], noise, _wander(np.where(told, t, 0.0))[:, None], given, own)
+        noise = np.where(told[..., None], variances, 1.0)
+        given = np.where(told[..., None], places, 0.0)
+        wander, own = _wander(np.where(told, t, 0.0)), np.where(t == 0, 1.0, 0.0)
+        last = [(0, 0), (0, 1)]
+        return cls(
+            np.concatenate([basis, np.broadcast_to([[[0.0, 1.0, 0.0]]], (len(t), 1, 3))], 1)[:, None],
+            _diagonal(np.pad(noise, [*last, (0, 0)])),
+            _diagonal(np.concatenate([np.zeros(noise.shape), speeds[:, 1:]], 1)),
+            np.pad(wander, [*last, (0, 1)])[:, None],
+            np.swapaxes(np.concatenate([given, speeds[:, :1]], 1), 1, 2)[..., None],
+            np.pad(own, last)[:, None],
+        )
 
 
 class Drive(NamedTuple):
@@ -62,7 +75,7 @@ class Drive(NamedTuple):
     @classmethod
     def of(cls, window: Window) -> "Drive":
         """By some of its times, maximum likelihood of both together: one of them alone takes the other's place."""
-        some = Window(*(column[:: -(-len(window.places) // _ENOUGH)] for column in window))
+        some = Window(*(column[:: -(-len(window.told) // _ENOUGH)] for column in window))
         likelihoods, shares = zip(*(_most_likely(some, noise) for noise in _NOISES), strict=True)
         best = int(np.argmax(likelihoods))
         return cls(float(_NOISES[best]), shares[best])
@@ -101,19 +114,25 @@ def _fit(window: Window, noise: float, jerk: Array) -> tuple[Array, Array, Array
     evidence, N, inverse = _evidence(window, noise, jerk)
     gain = (_PRIOR @ A.mT @ inverse)[..., 1:, :]
     left = np.eye(3)[1:] - gain @ A
-    return evidence, gain @ window.places, left @ _PRIOR @ left.mT + gain @ N @ gain.mT, gain
+    return evidence, gain @ window.told, left @ _PRIOR @ left.mT + gain @ N @ gain.mT, gain
 
 
 def _evidence(window: Window, noise: float, jerk: Array) -> tuple[Array, Array, Array]:
     """As `_fit`: log evidence (T, 3), covariance (T, 3, K, K) of the places if the motion at the time is known, and the
     inverse of what it is if that is not.
     """
-    A, y = window.basis, window.places
-    N = noise * window.noise + (jerk**2)[:, None, None] * window.wander
+    A, y = window.basis, window.told
+    N = noise * window.noise + window.doubt + (jerk**2)[:, None, None] * window.wander
     S = A @ _PRIOR @ A.mT + N
     inverse = np.linalg.inv(S).astype(np.float64, copy=False)
     evidence: Array = -0.5 * ((y.mT @ inverse @ y)[..., 0, 0] + np.linalg.slogdet(S)[1])
     return evidence, N, inverse
+
+
+def _diagonal(variances: Array) -> Array:
+    """(T, 3, K, K) of variances (T, K, 3)."""
+    found: Array = np.swapaxes(variances, 1, 2)[..., None] * np.eye(variances.shape[1])
+    return found
 
 
 def _wander(t: Array) -> Array:

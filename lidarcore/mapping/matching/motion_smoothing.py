@@ -15,7 +15,10 @@ from lidarcore.mapping.matching.sweep import PAUSE
 
 _SCANS = 7
 """Scans that tell a speed: as many at an end, where those nearest to it would not tell how steady the drive is."""
+_MEDIAN = 0.455  # of a square, in units of its variance
 _ROUNDS = 3  # a wrong speed shifts scans, from which it is told: a tenth of it comes back
+UNTOLD = np.array([np.zeros(3), np.full(3, 1e4)])
+"""A velocity of which nothing is known, and variances that say so."""
 
 
 class ScanMotion(NamedTuple):
@@ -25,6 +28,7 @@ class ScanMotion(NamedTuple):
     velocity      (3,) m/s, m/s, rad/s in the mean time of its beams that was taken out of it
     acceleration  (3,) m/s², m/s², rad/s², likewise
     variances     (3,) of the pose that it was placed at
+    distorted     (2, 3) the same velocity, with its variances, by how the scan is distorted; see `with_distortion`
     own           (3,) of its pose by its own noise alone: its neighbours share the errors of the map they all lie on
     scatter       (3,) of these, what differs from scan to scan
     sweep         (3, 3) covariance of where it stands, seen from where the sensor was at its stamp
@@ -37,6 +41,7 @@ class ScanMotion(NamedTuple):
     velocity: Array
     acceleration: Array
     variances: Array
+    distorted: Array
     own: Array
     scatter: Array
     sweep: Array
@@ -52,6 +57,22 @@ class ScanMotion(NamedTuple):
         values, V = np.linalg.eigh(self.sweep + kept * (self.shared + self.shared.T))
         added: Array = (V * np.maximum(values, 0.0)) @ V.T
         return added
+
+
+def with_distortion(motions: list[ScanMotion], faster: Array) -> list[ScanMotion]:
+    """Motions of smoothed scans, to be smoothed once more by how much `faster` (T, 2, 3) the sensor moved than was
+    taken out of each, with variances, as the surfaces say that several scans saw.
+
+    If these say otherwise than the places of scans by more than both claim, mostly, surfaces claim too much.
+    """
+    h = np.array([max(one.half, 1e-6) for one in motions])[:, None]
+    spread = np.array([np.diag(one.sweep) for one in motions]) / h**2
+    off, doubts = np.swapaxes(faster, 0, 1)
+    doubts = doubts * max(1.0, float(np.median(off**2 / (doubts + spread))) / _MEDIAN)
+    return [
+        one._replace(distorted=np.stack([one.velocity + more, doubt]))
+        for one, more, doubt in zip(motions, off, doubts, strict=True)
+    ]
 
 
 def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Array, list[ScanMotion]]:
@@ -73,11 +94,12 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
     matched = np.array([one.variances for one in motions])
     matched[0] = matched[min(1, len(motions) - 1)]  # the first scan is the map: it was matched with nothing
     variances = np.minimum(matched, [one.own for one in motions])
+    distorted = np.array([one.distorted for one in motions])
     laid = compose(poses, _covered(removed, h))
 
     def around(means: Array, rates: Array) -> Window:
         straight = _unrolled(means, rates[:, 0, 2], stamps + h[:, 0], on)
-        return Window.of(told, since, h, straight[there] - straight[:, None], variances[there])
+        return Window.of(told, since, h, straight[there] - straight[:, None], variances[there], distorted)
 
     drive = Drive.of(around(laid, removed))
     means, shown = laid, removed
