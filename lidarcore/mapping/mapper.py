@@ -96,11 +96,11 @@ class Mapper:
         for _ in range(_SEARCHES):
             if not self._back.search_beside():
                 break
-        refined = self._back.refine()
+        refined, parts = self._back.refine()
         if any(motion.half > 0 for motion in self._motions):
             self._take_distortion(refined)
             self._smooth_motion()
-            refined = self._back.refine()
+            refined = self._back.refine_again(parts)
         of_keyframes = [self._motions[number] for number in self._numbers]
         scatter = np.array([motion.scatter for motion in of_keyframes])
         share = kept(refined, np.array(self._locals), scatter)

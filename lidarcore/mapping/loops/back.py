@@ -129,8 +129,8 @@ class BackEnd:
             self.graph.move(refined.poses)
         return self._close(loops)
 
-    def refine(self) -> Refined:
-        """All keyframes adjusted at once; the graph takes the poses over. Loops that do not agree are dropped.
+    def refine(self) -> tuple[Refined, Known]:
+        """All keyframes adjusted at once, and the parts that this was done by; loops that do not agree are dropped.
 
         Passes that the graph does not know, seen from each other, are adjusted apart first, and together only if that
         says where they lie: else surfaces would be taken for the same ones that are not, and the map be wrong and sure.
@@ -145,6 +145,12 @@ class BackEnd:
                 break
             parts = more
         self.loops = [loop for loop in self.loops if _agrees(loop, refined.poses)]
+        return refined, parts
+
+    def refine_again(self, parts: Known) -> Refined:
+        """The same once more, now that scans were renewed: loops stay, and so do the parts that `refine` adjusted."""
+        refined = self._refined(parts)
+        self.graph.move(refined.poses)
         return refined
 
     def _parts(self) -> Known:
