@@ -230,7 +230,7 @@ def test_what_distortion_tells_of_speeds_counts_as_much_as_it_agrees_with_places
 
 
 @pytest.mark.parametrize("odometry", [True, False])
-def test_a_drive_that_begins_as_its_turn_becomes_steady_starts_where_it_says(odometry):
+def test_a_drive_that_begins_as_its_turn_becomes_steady_starts_less_far_off(odometry):
     """Its turn rate grew by 0.05 rad/s in the first scan, and in none after it.
 
     As if places of scans alone told that, the first one lay 2.5 mrad off, nine times as far as claimed.

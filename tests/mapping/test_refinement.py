@@ -9,8 +9,8 @@ from scipy.stats import chi2
 
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
-from lidarcore.mapping.graph.adjustment import _VAGUE_POSE, _VAGUE_SPEED, normal_equations, speeds_left
-from lidarcore.mapping.graph.adjustment_cells import Groups, Observations
+from lidarcore.mapping.graph.adjustment import _VAGUE, Surfaces, normal_equations, speeds_left
+from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
 from lidarcore.mapping.graph.refinement import Step, _measured, refine
 from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
@@ -45,7 +45,7 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
     variances = rng.uniform(0.5, 2, 9) * 1e-4
     since = rng.uniform(-0.05, 0.05, 9)
     seen = Observations(keyframes, means, normals, variances, np.ones(9, bool), since)
-    of_it = (seen, poses, np.zeros(len(poses), np.int64), 0.5, 2.0, 0.003)
+    of_it = Surfaces(seen, np.zeros(len(poses), np.int64), 0.5), poses, Noise(2.0, 0.003**2)
     sums, left = normal_equations(*of_it), speeds_left(*of_it)
     assert len(sums.groups.squares) == 3  # in one cell
     weights = 1 / (2 * variances + 3 * 0.003**2)
@@ -71,7 +71,7 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
     np.testing.assert_allclose(sums.gradient, rest[:9], rtol=1e-5, atol=1e-3)
     for k in range(3):
         of_k = np.r_[3 * k : 3 * k + 3, 9 + 3 * k : 12 + 3 * k]
-        P = np.linalg.inv(schur[np.ix_(of_k, of_k)] + np.diag([*_VAGUE_POSE, *_VAGUE_SPEED]))
+        P = np.linalg.inv(schur[np.ix_(of_k, of_k)] + np.diag(_VAGUE))
         np.testing.assert_allclose(left[k, 0], -(P @ rest[of_k])[3:], rtol=1e-3, atol=1e-6)
         np.testing.assert_allclose(left[k, 1], np.diag(P)[3:], rtol=1e-3)
 
@@ -91,7 +91,8 @@ def test_a_wall_that_bends_has_the_directions_of_its_parts():
         keyframes, means, normals = (np.concatenate(column) for column in zip(*parts, strict=True))
         n = len(means)
         seen = Observations(keyframes, means, normals, np.full(n, 1e-6), np.ones(n, bool), np.zeros(n))
-        found = normal_equations(seen, np.zeros((2, 3)), np.zeros(2, np.int64), 0.5, 1.0, 0.0)
+        surfaces = Surfaces(seen, np.zeros(2, np.int64), 0.5)
+        found = normal_equations(surfaces, np.zeros((2, 3)), Noise(1.0, 0.0))
         return found.information.toarray()
 
     apart = information(parts[0]) + information(parts[1])

@@ -20,10 +20,22 @@ _GAP = 0.15  # m between two surfaces side by side
 _WITHIN = 0.03  # m by which the returns of a patch scatter along it
 _STRETCH = 4  # cells, of which a line tells the direction of the surface better than each of them
 _BEYOND = 1e6  # m between two islands
-_VAGUE_POSE, _VAGUE_SPEED = (
-    (1.0, 1.0, 1.0),
-    (0.01, 0.01, 0.01),
-)  # 1/m² or 1/rad², s² times that: what no surface tells
+_VAGUE = np.array([1.0, 1.0, 1.0, 0.01, 0.01, 0.01])  # information, in m, rad and s, of what no surface tells
+
+
+class Surfaces(NamedTuple):
+    """What the keyframes of K poses saw of surfaces.
+
+    seen     all patches
+    islands  (K,) those of different islands saw different surfaces
+    size     m, of the cells that surfaces are cut into
+    known    cells are parted where parts of the way are not known, seen from each other; None: all of them are
+    """
+
+    seen: Observations
+    islands: Ints
+    size: float
+    known: Known | None = None
 
 
 class NormalEquations(NamedTuple):
@@ -38,41 +50,20 @@ class NormalEquations(NamedTuple):
     groups: Groups
 
 
-def normal_equations(
-    seen: Observations,
-    poses: Array,
-    islands: Ints,
-    size: float,
-    scale: float,
-    unevenness: float,
-    known: Known | None = None,
-) -> NormalEquations:
-    """The normal equations at poses (K, 3), by the cells that several keyframes of one island (K,) saw.
-
-    The variance of a patch is scale times that of its noise; what all patches of a group share is unevenness m.
-    Cells are parted where parts of the way are not known, seen from each other.
-    """
-    sums, groups, lines = _summed(seen, poses, islands, size, Noise(scale, unevenness**2), known, 3)
+def normal_equations(surfaces: Surfaces, poses: Array, noise: Noise) -> NormalEquations:
+    """The normal equations at poses (K, 3), by the cells that several keyframes of one island saw."""
+    sums, groups, lines = _summed(surfaces, poses, noise, 3)
     return NormalEquations(_sparse(sums.D, sums.U, sums.at, lines), sums.g.ravel(), groups)
 
 
-def speeds_left(
-    seen: Observations,
-    poses: Array,
-    islands: Ints,
-    size: float,
-    scale: float,
-    unevenness: float,
-    known: Known | None = None,
-) -> Array:
+def speeds_left(surfaces: Surfaces, poses: Array, noise: Noise) -> Array:
     """How much faster the sensor moved, m/s ahead, m/s to the left and rad/s, than was taken out of each scan, and the
-    variances of that: (K, 2, 3).
+    variances of that: (K, 2, 3). The poses (K, 3) are those that solve the normal equations.
 
-    A scan that is still distorted does not lie on what others saw of the same surfaces, wherever it is put. Arguments
-    are those of `normal_equations`, at poses that solve them.
+    A scan that is still distorted does not lie on what others saw of the same surfaces, wherever it is put.
     """
-    sums, _, _ = _summed(seen, poses, islands, size, Noise(scale, unevenness**2), known, 6)
-    H = sums.D + np.diag([*_VAGUE_POSE, *_VAGUE_SPEED])
+    sums, _, _ = _summed(surfaces, poses, noise, 6)
+    H = sums.D + np.diag(_VAGUE)
     np.add.at(H, sums.at[:, 0], -sums.U @ sums.U.mT)
     turn = np.zeros((len(poses), 6, 6))
     turn[:, [2, 5], [2, 5]] = 1.0
@@ -83,16 +74,9 @@ def speeds_left(
     return np.stack([faster, np.diagonal(P, axis1=1, axis2=2)[:, 3:]], 1)
 
 
-def _summed(
-    seen: Observations,
-    poses: Array,
-    islands: Ints,
-    size: float,
-    noise: Noise,
-    known: Known | None,
-    unknowns: int,
-) -> tuple[Sums, Groups, int]:
+def _summed(surfaces: Surfaces, poses: Array, noise: Noise, unknowns: int) -> tuple[Sums, Groups, int]:
     """What all groups add up to, with so many unknowns for each keyframe; what is left of them; number of lines."""
+    seen, islands, size, known = surfaces
     arms, normals = (rotate(poses[seen.keyframes, 2], v) for v in (seen.means, seen.normals))
     places = arms + poses[seen.keyframes, :2] + _BEYOND * islands[seen.keyframes, None]
     order, starts = _ordered(places, normals, size, seen.keyframes, known)

@@ -24,8 +24,8 @@ from lidarcore.geometry import (
     wrap,
 )
 from lidarcore.geometry.kernels import relative_with_covariance
-from lidarcore.mapping.graph.adjustment import NormalEquations, normal_equations, speeds_left
-from lidarcore.mapping.graph.adjustment_cells import Groups, Observations
+from lidarcore.mapping.graph.adjustment import NormalEquations, Surfaces, normal_equations, speeds_left
+from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
 from lidarcore.mapping.graph.known import Known
 from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.matching.patches import Patches
@@ -118,10 +118,10 @@ def refine(
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
-    seen = _observations(scans, since, assumed**2)
+    surfaces = Surfaces(_observations(scans, since, assumed**2), islands, size, known)
     poses, scale, unevenness = poses.copy(), 1.0, 0.005
     for _ in range(rounds):
-        equations = normal_equations(seen, poses, islands, size, scale, unevenness, known)
+        equations = normal_equations(surfaces, poses, Noise(scale, unevenness**2))
         H, g = _with_steps(equations, poses, steps)
         step = factor(H).solve(-g)
         poses = poses + step.reshape(-1, 3)
@@ -129,9 +129,9 @@ def refine(
         scale, unevenness = _measured(equations.groups, len(poses))
         if -g @ step < _SETTLED * len(g):
             break
-    equations = normal_equations(seen, poses, islands, size, scale, unevenness, known)
+    equations = normal_equations(surfaces, poses, Noise(scale, unevenness**2))
     recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
-    speeds = speeds_left(seen, poses, islands, size, scale, unevenness, known)
+    speeds = speeds_left(surfaces, poses, Noise(scale, unevenness**2))
     return Refined(poses, sweeps, speeds, _joined(known, len(poses)), scale, unevenness, recovery)
 
 
