@@ -60,7 +60,7 @@ class Frame:
 
     @property
     def locate_us(self) -> float | None:
-        """Time that the pose took; None if none was estimated, or it was known from before."""
+        """Time that the pose took; None if none was estimated, or newer scans have been seen since."""
         return None if self.localization is None else self.localization.took_us
 
     @property

@@ -23,7 +23,7 @@ class Localization:
 
     stored  ids in the file of landmarks by their ids in `tracking`; in a known map they are the same
     motion  what was taken out of the scan by deskewing: m/s ahead, rad/s, m/s to the left
-    took_us time to estimate the pose and to bring the map up to date; None where that was known from before
+    took_us time to estimate the pose and to bring the map up to date; None where newer scans have been seen since
     """
 
     tracking: TrackingResult
@@ -122,9 +122,9 @@ class Run:
     def step(
         self, index: int, scan: Scan, features: Features, clusters: Clusters | None, method: str
     ) -> Localization:
-        """Go on by a scan; one that was seen already is shown as it was then."""
+        """Go on by a scan; one that was seen already is shown as it was then, the newest with the time that it took."""
         if (seen := self.recall(index)) is not None:
-            return replace(seen, took_us=None)
+            return seen if index == self.newest else replace(seen, took_us=None)
         begin = time.perf_counter()
         found = self.navigator.step(scan, features, clusters)
         truth = self.trails.add(found, scan.truth)

@@ -39,6 +39,7 @@ class Metrics(Collector):
         self._extraction = self._histogram("extraction", "segments and corners by every method shown", WORK)
         self._location = self._histogram("location", "the pose and the map", WORK)
         self._drawing = self._histogram("drawing", "the scene", WORK)
+        self._located: Localization | None = None
 
     def observe(self, runtime: Runtime, hub: Hub, recorder: AsyncRecorder) -> None:
         """Report on these from now on."""
@@ -75,8 +76,10 @@ class Metrics(Collector):
     def _processed(self, frame: Frame) -> None:
         self._extraction.observe(1e-6 * frame.extract_us)
         self._drawing.observe(1e-6 * frame.draw_us)
-        if frame.locate_us is not None:
+        drawn_again = frame.localization is self._located
+        if frame.locate_us is not None and not drawn_again:
             self._location.observe(1e-6 * frame.locate_us)
+        self._located = frame.localization
 
     def _histogram(self, name: str, about: str, buckets: tuple[float, ...]) -> Histogram:
         return Histogram(

@@ -161,7 +161,7 @@ class LocalizationJson(TypedDict):
 class TimingsJson(TypedDict):
     """Work on this scan by its stages; `extract_us` of all methods together, `age_ms` since its last byte arrived.
 
-    `locate_us` is null where no pose was estimated, or it was known from before, as in a recording that is repeated.
+    `locate_us` is null where no pose was estimated, or newer scans have been seen since, as in a repeated one.
     """
 
     extract_us: float

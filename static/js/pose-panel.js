@@ -76,7 +76,7 @@ const COUNTS = [
   {
     key: "locate",
     label: "Time per scan",
-    hint: "Time to estimate the pose and update the map; none where the pose is known from before",
+    hint: "Time to estimate the pose and update the map; none for a scan before the newest one",
     read: (_, { locate_us: took }) => took ?? NaN,
     text: microseconds,
   },

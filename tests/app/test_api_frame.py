@@ -147,3 +147,13 @@ def test_only_a_pose_that_is_estimated_takes_time(server: Server, room: Path) ->
     assert newer["timings"]["locate_us"] > 0
     assert known["localization"]
     assert known["timings"]["locate_us"] is None
+
+
+def test_a_scan_that_is_drawn_again_keeps_the_time_that_its_pose_took(server: Server, room: Path) -> None:
+    server.play(room, paused=True)
+    with server.stream() as stream:
+        server.change("PATCH", "/settings", {"navigation": {"mode": "slam"}})
+        new = stream.frame(lambda f: f["localization"])
+        server.change("PATCH", "/settings", {"view": {"ellipse_scale": 7}})
+        again = stream.frame(lambda f: f["sequence"] > new["sequence"])
+    assert again["timings"]["locate_us"] == new["timings"]["locate_us"] > 0

@@ -1,5 +1,7 @@
 """What Prometheus would read, read by its own parser."""
 
+from pathlib import Path
+
 import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
@@ -42,6 +44,20 @@ def test_of_a_recording_frames_are_counted_and_timed_and_no_sensor_is_spoken_of(
     assert after["lidarcore_recording"] == 0
     assert after["process_resident_memory_bytes"] > 1e7
     assert not [name for name in after if "sensor" in name]
+
+
+def test_the_pose_of_a_scan_that_is_drawn_again_is_counted_once(server: Server, room: Path) -> None:
+    server.play(room, paused=True)
+    before = scrape(server)
+    with server.stream() as stream:
+        server.change("PATCH", "/settings", {"navigation": {"mode": "slam"}})
+        frame = stream.frame(lambda f: f["localization"])
+        for ellipse_scale in range(3, 6):
+            server.change("PATCH", "/settings", {"view": {"ellipse_scale": ellipse_scale}})
+            frame = stream.frame(lambda f, last=frame: f["sequence"] > last["sequence"])
+    after = scrape(server)
+    name = "lidarcore_location_seconds_count"
+    assert after[name] == before[name] + 1
 
 
 @pytest.mark.long
