@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lidarcore import Scan, SensorNoise
-from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.matching.patches import Patches, joined, patches
 from lidarcore.mapping.settings import MatchSettings
 
 NEAR, FAR = 2.0, 2.4  # m ahead
@@ -52,6 +52,28 @@ def test_walls_seen_at_a_slant_are_patches_as_far_as_beams_show_them_straight() 
     assert (slanted & side & (seen.means[:, 0] > 6)).sum() >= 8
     assert np.array_equal(seen.near.means, seen.means[~slanted])
     assert seen.near.means[side[~slanted], 0].max() < 6
+
+
+def patches_of_a_wall(beams: int, scatter: float, rng: np.random.Generator) -> Patches:
+    """A wall 3 m ahead whose returns scatter so far, m, along their beams."""
+    bearings = np.linspace(-0.4, 0.4, beams)
+    ranges = 3.0 / np.cos(bearings) + rng.normal(0, scatter, beams)
+    return patches(Scan(ranges, bearings), MatchSettings(noise=SensorNoise(0.01, 1e-6), unevenness=0.0))
+
+
+@pytest.mark.parametrize("beams", [25, 100, 400])
+def test_patches_of_a_flat_wall_are_as_far_off_as_noise_makes_them(beams: int) -> None:
+    """Those of few returns, too, whose own scatter tells little of it."""
+    rng = np.random.default_rng(1)
+    seen = joined([patches_of_a_wall(beams, 0.01, rng) for _ in range(200)])
+    squares = (seen.means[:, 0] - 3.0) ** 2 / seen.variances
+    assert abs(squares.mean() - 1) < 4 * np.sqrt(2 / len(squares))
+
+
+def test_returns_of_a_rough_surface_are_as_far_off_as_they_scatter() -> None:
+    rng = np.random.default_rng(1)
+    seen = joined([patches_of_a_wall(400, 0.02, rng) for _ in range(200)])
+    assert abs(np.sqrt(np.median(seen.variances * seen.counts)) - 0.02) < 0.001
 
 
 def test_three_returns_that_lie_on_no_line_make_no_patch() -> None:

@@ -25,6 +25,7 @@ from lidarcore.simulation.rooms import rectangular_room
 EXTRACTION = ExtractionSettings(noise=NOISE)
 LARGE = World(BUILDING.walls * 2)
 ROOM = rectangular_room(8, 4)
+SEGMENTS_OF_A_SCAN = 2**20  # room for them, in the numbers of segments
 
 
 def scans_of(world: World, poses: Array, seed: int = 1) -> list[Scan]:
@@ -71,7 +72,7 @@ def short_sighted(world: World, pose: Array, noise: SensorNoise, rng: np.random.
 class Drive:
     """What became of the walls of a building in one drive around it, more than once.
 
-    on    by id, the true walls that it was on; None where the map was off by more than 0.3 m
+    on    by id, the true walls that it was on; None where the map was off by more than 0.3 m, or contradicts itself
     last  ids in the last picture
     bent  m that a wall moved across itself where loops closed
     """
@@ -82,7 +83,10 @@ class Drive:
 
 
 def around(seed: int) -> Drive:
-    """Which true wall a wall is, is told by the true pose of the nearest keyframe, wherever the map has it."""
+    """Which true wall a wall is, is told by the true pose of a keyframe, wherever the map has it.
+
+    The nearest one and the last one that saw the wall, which may be of another pass, have to tell the same.
+    """
     way_there = way(0.5, 1.3) * [2, 2, 1]
     scans = drive(way_there, np.random.default_rng(seed), short_sighted, world=LARGE)
     mapper, ids = Mapper(SETTINGS), WallIds()
@@ -97,10 +101,14 @@ def around(seed: int) -> Drive:
         found = find_walls(known.scans, known.poses, known.covariances, grid, extraction=EXTRACTION)
         walls = ids.identified(found)
         pictures.append((len(mapper.loops), walls))
-        for id, ends in zip(walls.ids.tolist(), walls.ends, strict=True):
+        for i, (id, ends) in enumerate(zip(walls.ids.tolist(), walls.ends, strict=True)):
             near = int(np.argmin(np.hypot(*(known.poses[:, :2] - ends.mean(axis=0)).T)))
-            there = compose(way_there[known.numbers[near]], inverse(known.poses[near]))
-            on.setdefault(id, set()).add(true_wall(act(there, ends), LARGE))
+            newest = walls.observations.segment[walls.observations.wall == i].max() // SEGMENTS_OF_A_SCAN
+            told = set()
+            for node in near, int(np.searchsorted(known.numbers, newest)):
+                there = compose(way_there[known.numbers[node]], inverse(known.poses[node]))
+                told.add(true_wall(act(there, ends), LARGE))
+            on.setdefault(id, set()).add(told.pop() if len(told) == 1 else None)
     bent = [max(moved(a, b)) for (before, a), (after, b) in pairwise(pictures) if after > before]
     return Drive(on, set(pictures[-1][1].ids.tolist()), max(bent))
 

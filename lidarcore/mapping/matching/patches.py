@@ -18,6 +18,7 @@ from lidarcore.mapping.matching.point_lines import (
     SLANTED,
     TILT,
     VARIANCE,
+    add_scatter,
     add_slanted,
     fit_lines,
 )
@@ -87,6 +88,7 @@ def _rows(seen: Sight, radius: float, gap: float, size: float, noise: Array) -> 
     single, table = np.empty((len(points), FIELDS)), np.empty((len(points), FIELDS))
     fit_lines(points, ranges, reaches, gap, noise, single)
     add_slanted(points, bearings, spacing, noise, single)
+    add_scatter(single)
     return table[: _gather(single, size, table)]
 
 

@@ -6,13 +6,14 @@ from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 
 LEAST = 3  # points that make a line
-MEAN, NORMAL, VARIANCE, TILT, COUNT, FIELDS = 0, 2, 4, 5, 6, 7
-"""Columns of a table of patches, and their number."""
+MEAN, NORMAL, VARIANCE, TILT, COUNT, SCATTER, FIELDS = 0, 2, 4, 5, 6, 7, 8
+"""Columns of a table of patches, and their number; SCATTER is m² by which the points of a line lie off it, summed."""
 SLANTED = 0.0
 """Instead of a count: the returns lie far apart, along a wall that is seen at a slant."""
 _FARTHEST = 3.0  # m between two of them
 _STRAIGHT = 9.0  # squared standard deviations by which the middle one of three is off their line, at most
 _RELIEF = 0.01  # m by which walls are off lines of that length
+_ROUGH = 5.0  # standard deviations by which points scatter more about a line than noise alone makes them, if it is not
 
 
 @kernel
@@ -45,11 +46,10 @@ def _fit_line(points: Array, i: int, first: int, count: int, noise: Array, row: 
         nx, ny = -nx, -ny
     square = px * px + py * py
     across = (nx * px + ny * py) ** 2
-    variance = noise[0] * across / square + noise[1] * (square - across)
-    variance = max(variance, max(half - root, 0.0) * count / max(count - 2, 1))
     row[MEAN], row[MEAN + 1], row[NORMAL], row[NORMAL + 1] = px, py, nx, ny
-    row[VARIANCE], row[TILT] = variance, variance / max(count * (half + root), 1e-9)
-    row[COUNT] = count
+    row[VARIANCE] = noise[0] * across / square + noise[1] * (square - across)
+    row[TILT] = row[VARIANCE] / max(count * (half + root), 1e-9)
+    row[COUNT], row[SCATTER] = count, max(half - root, 0.0) * count
 
 
 @kernel
@@ -72,6 +72,41 @@ def add_slanted(points: Array, bearings: Array, spacing: float, noise: Array, si
         if off * off < _STRAIGHT * (noise[0] * across * across / square + _RELIEF**2):
             _fit_line(points, i, i - 1, 3, noise, single[i])
             single[i, COUNT] = SLANTED
+
+
+@kernel
+def add_scatter(single: Array) -> None:
+    """Adds to the variances of lines what their points scatter more than noise makes them.
+
+    Of few points the scatter is 1.5 times as large as usual here, and half as large there, where noise is all there is:
+    it is believed only where it is significantly more than that of most lines of the scan.
+    """
+    usual = min(_usual_scatter(single), 1.0)
+    for row in single:
+        free = _free(row)
+        if row[SCATTER] > usual * row[VARIANCE] * (free + _ROUGH * np.sqrt(2.0 * free)):
+            times = max(row[SCATTER] / (free * row[VARIANCE]), 1.0)
+            row[VARIANCE] *= times
+            row[TILT] *= times
+
+
+@kernel
+def _usual_scatter(single: Array) -> float:
+    """How many times as far as noise makes them, squared, points lie off most lines; 1 if there is no line."""
+    times, number = np.empty(len(single)), 0
+    for row in single:
+        if row[COUNT] >= LEAST:
+            free = _free(row)
+            median = free * (1.0 - 2.0 / (9.0 * free)) ** 3  # of chi-square, by Wilson and Hilferty
+            times[number] = row[SCATTER] / (row[VARIANCE] * median)
+            number += 1
+    return float(np.median(times[:number])) if number else 1.0
+
+
+@kernel
+def _free(row: Array) -> float:
+    """Points of a line beside the two that it goes through; one where they are fewer."""
+    return max(max(row[COUNT], LEAST) - 2.0, 1.0)
 
 
 @kernel
