@@ -9,7 +9,7 @@ from lidarcore.compiled import kernel
 
 _TILT = 1.0  # rad of a cell's line from the mean of its normals: held to 0.1, maps of long corridors bent
 _OUTLIER = 9.0  # squared standard deviations from which on a patch counts less
-_BENT = 16.0  # squared standard deviations by which a line differs to have a direction of its own: no chance among hundreds
+_BENT = 16.0  # squared standard deviations by which one of hundreds of lines is turned, if not by chance
 _PASSES = 4  # over a cell, until outliers no longer move its line
 
 
