@@ -10,7 +10,8 @@ import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import compose, inverse, relative, rotate
-from lidarcore.mapping.matching.jerk import Drive, Window, estimated
+from lidarcore.mapping.matching.jerk import Drive, estimated, window
+from lidarcore.mapping.matching.jerk_fits import Window
 from lidarcore.mapping.matching.sweep import PAUSE
 
 _SCANS = 7
@@ -26,7 +27,7 @@ class ScanMotion(NamedTuple):
 
     half          s, mean time of its beams after its stamp; 0 if they were taken at once
     velocity      (3,) m/s, m/s, rad/s in the mean time of its beams that was taken out of it
-    acceleration  (3,) m/s², m/s², rad/s², likewise
+    acceleration  (3,) m/s², m/s², rad/s², with which the sweep would begin where it began
     variances     (3,) of the pose that it was placed at
     distorted     (2, 3) the same velocity, with its variances, by how the scan is distorted; see `with_distortion`
     own           (3,) of its pose by its own noise alone: its neighbours share the errors of the map they all lie on
@@ -99,7 +100,7 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
 
     def around(means: Array, rates: Array) -> Window:
         straight = _unrolled(means, rates[:, 0, 2], stamps + h[:, 0], on)
-        return Window.of(told, since, h, straight[there] - straight[:, None], variances[there], distorted)
+        return window(told, since, h[:, 0], straight[there] - straight[:, None], variances[there], distorted)
 
     drive = Drive.of(around(laid, removed))
     means, shown = laid, removed

@@ -1,0 +1,132 @@
+"""Speed and acceleration by places around a time: for each of several densities of the jerk, and by all together."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lidarcore.arrays import Array, Ints
+from lidarcore.compiled import kernel
+
+_PRIOR = np.array([[1.0, 10.0, 1.0], [1.0, 10.0, 1.0], [1.0, 10.0, 2.0]]) ** 2
+"""(3, 3) variances of place, speed and acceleration in m and rad, before any place says anything."""
+_Y, _A, _BENT, _OWN = 0, 1, 4, 5  # columns of what is whitened
+_EVIDENCE, _RATES, _SPREAD, _SHARED, _FOUND = 0, 1, 3, 6, 8  # what a fit finds
+
+
+class Window(NamedTuple):
+    """K - 1 places around each of T times, one of them at the time itself, and the speed then; each dimension alone.
+
+    basis   (T, K, 3) of place, speed and acceleration at the time
+    noise   (T, 3, K) variances of the places
+    doubt   (T, 3, K) variance of the speed
+    near    (T, K + 1, K + 1) covariance of what white jerk of density 1 adds to them and, last, to how the sweep is
+            bent, if it is no farther from the time than the next place
+    far     (T, K + 1, K + 1) the same of jerk farther away
+    told    (T, 3, K) m, m, rad; the speed, in these per second, is the last one
+    own     (T,) which place is the one at the time itself
+    """
+
+    basis: Array
+    noise: Array
+    doubt: Array
+    near: Array
+    far: Array
+    told: Array
+    own: Ints
+
+
+class Densities(NamedTuple):
+    """D pairs of densities of the jerk, farther away and near, (D, 2, 3) m/s², m/s², rad/s² within a second; and how
+    often each is the one, as logarithms of shares (D, 3)."""
+
+    jerks: Array
+    shares: Array
+
+
+@kernel
+def evidences(window: Window, some: Ints, noise: float, jerks: Array, found: Array) -> None:
+    """Writes log evidences (D, S, 3) of `noise` times the variances and of densities (D, 2, 3) at some (S,) times."""
+    K = window.told.shape[2]
+    S, X, one = np.empty((K, K)), np.empty((K, 6)), np.empty(_FOUND)
+    for n in range(len(jerks)):
+        for s in range(len(some)):
+            for d in range(3):
+                _fit(window, some[s], d, noise, jerks[n, :, d], S, X, one)
+                found[n, s, d] = one[_EVIDENCE]
+
+
+@kernel
+def mix(window: Window, noise: float, of: Densities, rates: Array, spread: Array, shared: Array) -> None:
+    """Writes speeds and accelerations (T, 2, 3) with covariances (T, 3, 2, 2), and theirs (T, 2, 3) with the error of
+    the place at the time itself: each density counts as it explains the places."""
+    K, D = window.told.shape[2], len(of.jerks)
+    S, X, found = np.empty((K, K)), np.empty((K, 6)), np.empty((D, _FOUND))
+    for k in range(len(window.told)):
+        for d in range(3):
+            best = -np.inf
+            for n in range(D):
+                _fit(window, k, d, noise, of.jerks[n, :, d], S, X, found[n])
+                found[n, _EVIDENCE] += of.shares[n, d]
+                best = max(best, found[n, _EVIDENCE])
+            weights = np.exp(found[:, _EVIDENCE] - best)
+            weights /= weights.sum()
+            mean = weights @ found
+            rates[k, :, d], shared[k, :, d] = mean[_RATES:_SPREAD], mean[_SHARED:_FOUND]
+            off = found[:, _RATES:_SPREAD] - mean[_RATES:_SPREAD]
+            between = off.T @ (weights.reshape(-1, 1) * off)
+            spread[k, d, 0, 0] = mean[_SPREAD] + between[0, 0]
+            spread[k, d, 0, 1] = spread[k, d, 1, 0] = mean[_SPREAD + 1] + between[0, 1]
+            spread[k, d, 1, 1] = mean[_SPREAD + 2] + between[1, 1]
+
+
+@kernel
+def _fit(
+    window: Window, k: int, d: int, noise: float, jerks: Array, S: Array, X: Array, found: Array
+) -> None:
+    """Log evidence, speed and acceleration with three numbers of their covariance, and their covariances with the error
+    of the place at the time, of one dimension at one time if the jerk has these densities (2,).
+
+    Places are y = A x + e, where e, by noise and jerk, shares b with how the sweep is bent: E[bent | e] = b^T N^-1 e.
+    """
+    K, far, near = len(S), jerks[0] ** 2, jerks[1] ** 2
+    for i in range(K):
+        for j in range(i + 1):
+            S[i, j] = near * window.near[k, i, j] + far * window.far[k, i, j]
+        S[i, i] += noise * window.noise[k, d, i] + window.doubt[k, d, i]
+        X[i, _Y], X[i, _BENT], X[i, _OWN] = window.told[k, d, i], near * window.near[k, i, K], 0.0
+        for j in range(3):
+            X[i, _A + j] = window.basis[k, i, j]
+    X[window.own[k], _OWN] = noise * window.noise[k, d, window.own[k]]
+    logs = _whiten(S, X)
+    G = X.T @ X
+    M, Z = G[_A:_BENT, _A:_BENT] + np.diag(1 / _PRIOR[d]), np.empty((3, 4))
+    Z[:, 0], Z[:, 3] = G[_A:_BENT, _Y], G[_A:_BENT, _OWN]
+    for j in range(3):
+        Z[j, 1], Z[j, 2] = (1.0 if j == 1 else 0.0), (1.0 if j == 2 else 0.0) - G[_A + j, _BENT]
+    logs += _whiten(M, Z)
+    H = Z.T @ Z
+    found[_EVIDENCE] = -0.5 * (G[_Y, _Y] - H[0, 0]) - logs
+    found[_RATES], found[_RATES + 1] = H[1, 0], H[2, 0] + G[_BENT, _Y]
+    found[_SPREAD], found[_SPREAD + 1] = H[1, 1], H[1, 2]
+    found[_SPREAD + 2] = H[2, 2] + near * window.near[k, K, K] - G[_BENT, _BENT]
+    found[_SHARED], found[_SHARED + 1] = H[1, 3], H[2, 3] + G[_BENT, _OWN]
+
+
+@kernel
+def _whiten(S: Array, X: Array) -> float:
+    """Makes X (n, m) that which has the identity for its covariance, S (n, n) being it before, of which only the lower
+    triangle counts; S becomes its Cholesky factor. Returns half the logarithm of its determinant."""
+    n, logs = len(S), 0.0
+    for j in range(n):
+        for i in range(j, n):
+            for q in range(j):
+                S[i, j] -= S[i, q] * S[j, q]
+        root = np.sqrt(S[j, j])
+        logs += np.log(root)
+        for i in range(j, n):
+            S[i, j] /= root
+        for c in range(X.shape[1]):
+            for q in range(j):
+                X[j, c] -= S[j, q] * X[q, c]
+            X[j, c] /= root
+    return logs

@@ -1,0 +1,56 @@
+"""How far white jerk makes a motion differ from a steady acceleration, in what sweeps show of it.
+
+With place, speed and acceleration at time 0 given, an impulse of jerk at time u adds (t - u)² / 2 to every place
+beyond it. All that sweeps show are integrals of places, so what it adds to these is a piecewise polynomial in u; jerk
+that is white adds covariances, the integrals of their products [Rasmussen & Williams 2006, eq. 2.23].
+"""
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.compiled import kernel
+
+_AT, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # exact for products of two quartic polynomials
+
+
+@kernel
+def wander(t: Array, h: Array, near: Array, far: Array) -> None:
+    """Writes covariances (T, K + 2, K + 2) of what white jerk of density 1 adds to what sweeps show: K mean places, m;
+    the speed, m/s; and how the first is bent, m/s².
+
+    Mean places are those of sweeps around t (T, K) s, each h (T,) s before and after. The speed is that of the line
+    through the sweep around 0 s. A sweep that is bent begins where one of a higher acceleration would, seen from its
+    mean place. `near` is by jerk that is no farther from 0 s than the nearest of the other sweeps, `far` by the rest.
+    """
+    K = t.shape[1]
+    edges, added = np.empty(2 * K + 3), np.empty(K + 2)
+    for k in range(len(t)):
+        beside = np.inf
+        for i in range(K):
+            if t[k, i] != 0:
+                beside = min(beside, abs(t[k, i]))
+            edges[i], edges[K + i] = max(abs(t[k, i]) - h[k], 0.0), abs(t[k, i]) + h[k]
+        edges[2 * K], edges[2 * K + 1], edges[2 * K + 2] = 0.0, h[k], beside if beside < np.inf else h[k]
+        edges.sort()
+        near[k], far[k] = 0.0, 0.0
+        for e in range(len(edges) - 1):
+            middle, half = (edges[e + 1] + edges[e]) / 2, (edges[e + 1] - edges[e]) / 2
+            covariance = near[k] if middle < beside else far[k]
+            if half > 0:
+                for side in (-1.0, 1.0):
+                    for g in range(len(_AT)):
+                        _add(t[k], h[k], middle + half * _AT[g], side, added)
+                        for i in range(K + 2):
+                            for j in range(K + 2):
+                                covariance[i, j] += half * _WEIGHTS[g] * added[i] * added[j]
+
+
+@kernel
+def _add(t: Array, h: float, u: float, side: float, added: Array) -> None:
+    """What an impulse of jerk at u s, after 0 s (side 1) or before (-1), adds to what sweeps show."""
+    K, d = len(t), max(h - u, 0.0)
+    for i in range(K):
+        added[i] = side * (max(side * t[i] + h - u, 0.0) ** 3 - max(side * t[i] - h - u, 0.0) ** 3) / (12 * h)
+    added[K] = 1.5 * (u * d**3 / 6 + d**4 / 8) / h**3
+    begin, mean = (-(d**2) / 2 if side < 0 else 0.0), side * d**3 / (12 * h)
+    added[K + 1] = 3 * (begin - mean) / h**2
