@@ -46,13 +46,19 @@ export function mountInspector() {
   new ResizeObserver(foldLegend).observe($("inspector"));
   $("legend").addEventListener("toggle", () => $("legend").open && isOnLegend() && setFolded(true));
   for (const key of SHOWN) on([key], refresh);
+  on(["panel"], () => isOverPanels() && setFolded(true));
 }
+
+const isOverPanels = () => !matchMedia("(min-width: 900px)").matches;
 
 function refresh() {
   const frame = get("frame");
   const thing = frame && (inspectedMapped(frame) ?? inspectedWall(frame) ?? inspectedCorner(frame));
   $("inspector").hidden = !thing;
-  if (thing?.key !== shown) standAside(thing);
+  if (thing?.key !== shown) {
+    standAside(thing);
+    if (isOverPanels()) setFolded(false);
+  }
   if (thing) draw(thing);
 }
 

@@ -107,7 +107,7 @@ function row({ id, source, mode, started, landmarks, walls, grid }, live) {
       class: "entry",
       title: `Localize in map ${id}`,
       "data-key": `map-${id}`,
-      onclick: () => localizeIn(id),
+      onclick: () => chooseMap(id),
     },
     el("span", {}, `Map ${id}`),
     el("small", {}, holds),
@@ -142,6 +142,15 @@ const saveLink = (path, download, name, what) =>
     { class: "button", href: address(path).href, download, "aria-label": `Save ${what} as ${name}` },
     name,
   );
+
+function chooseMap(session) {
+  if (get("settings").navigation.mode !== "slam") return localizeIn(session);
+  toast("The map that SLAM builds is kept, but cannot be gone on with.", {
+    title: `End SLAM, and localize in map ${session}?`,
+    action: { label: "Localize", run: () => localizeIn(session) },
+    linger: QUESTION_MS,
+  });
+}
 
 async function localizeIn(session) {
   const chosen = await attempt(

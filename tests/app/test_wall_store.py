@@ -158,6 +158,23 @@ def test_history_of_a_wall_is_told_page_by_page(server: Server) -> None:
     assert_problem(server.http.get(f"/walls/{2**70}/history", params=kept), 422)
 
 
+def test_walls_are_those_of_the_map_that_the_sensor_is_localized_in(server: Server) -> None:
+    store = server.app.state.server.landmarks
+    run = store.begin_walls("room.mcap")
+    run.put(GRID, walls(stored(4)))
+    wait_until(lambda: run.session is not None and store.status.behind_s == 0)
+    server.change("PUT", "/localization/map", {"session": run.session})
+    server.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
+    wait_until(lambda: server.get("/localization")["session"] == run.session)
+    assert server.get("/walls")["walls"][0]["length"] == stored(4).length
+    assert server.get("/walls") == server.get("/walls", session=run.session)
+    files = assert_problem(server.http.get("/map/grid", params={"format": "zip"}), 404)["detail"]
+    assert "/map?format=zip" in files
+    server.next_frame()
+    two = {"first": "map-wall@0,1", "second": "map-wall@1,0"}
+    assert "A map that is kept" in assert_problem(server.http.get("/measure", params=two), 404)["detail"]
+
+
 def test_a_run_keeps_its_confirmed_walls_and_says_when_it_has_ended(tmp_path: Path) -> None:
     with closing(LandmarkStore(tmp_path / "maps.db")) as store:
         run = store.begin_walls("room.mcap")

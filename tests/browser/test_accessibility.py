@@ -110,8 +110,9 @@ def test_what_is_selected_elsewhere_leaves_the_tabs_of_a_phone_free(phone: Visit
     tabs = phone.page.get_by_role("tablist").bounding_box()
     assert card.bounding_box()["y"] >= tabs["y"] + tabs["height"]
     phone.page.get_by_role("tab", name="Setup").tap()
-    card.get_by_role("button", name="Fold the inspector").tap()
     expect(phone.page.get_by_label("Fitter")).to_be_in_viewport()
+    card.get_by_role("button", name="Fold the inspector").tap()
+    expect(card.get_by_role("table").first).to_be_visible()
 
 
 @pytest.mark.long

@@ -302,6 +302,17 @@ def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
     assert session not in [entry["id"] for entry in server.get("sessions")["sessions"]]
 
 
+def test_slam_ends_for_another_map_only_after_a_question(mapped: Visitor) -> None:
+    page, server = mapped.page, mapped.server
+    session = server.get("localization")["session"]
+    page.get_by_title(f"Localize in map {session}").click()
+    expect(page.locator(".toast")).to_contain_text("cannot be gone on with")
+    assert server.get("settings")["navigation"]["mode"] == "slam"
+    page.get_by_role("button", name="Localize", exact=True).click()
+    wait_until(lambda: server.get("settings")["navigation"]["mode"] == "localize", "it is localized")
+    wait_until(lambda: server.get("localization")["session"] == session, "it is that map")
+
+
 def test_a_map_of_ros_is_loaded_as_two_files_and_localized_in(mapped: Visitor, tmp_path: Path) -> None:
     page, server = mapped.page, mapped.server
     cells = np.full((80, 120), -1)

@@ -71,6 +71,7 @@ def test_what_no_pose_is_near_to_is_left_out():
     ("text", "word"),
     [
         ("1 2 3\n", "eight numbers"),
+        ("", "eight numbers"),
         ("a b\n", "not a file"),
         ("1 b\n", r"column 2\.$"),
         (8 * "nan ", "eight numbers"),

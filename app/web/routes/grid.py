@@ -27,6 +27,7 @@ router = APIRouter(tags=["localization"], responses=documented(404, 422))
 
 NO_BUILDING = 'There is no map of whole scans: set navigation.mode to slam and navigation.method to "scans".'
 NOT_YET = "The map of whole scans has no {} yet: wait for further scans."
+KEPT = "The sensor is localized in a map that is kept: its walls are at /walls, its files at /map?format=zip."
 
 
 def running_picture(runtime: Runtime) -> MapPicture:
@@ -42,7 +43,8 @@ def running_walls(runtime: Runtime) -> Walls:
     """The walls of the map that is made now. Raises NotFoundError."""
     found = running_picture(runtime).walls
     if found is None:
-        raise NotFoundError(NOT_YET.format("walls"))
+        is_made = runtime.settings.navigation.mode == "slam"
+        raise NotFoundError(NOT_YET.format("walls") if is_made else KEPT)
     return found
 
 

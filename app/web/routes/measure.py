@@ -26,7 +26,8 @@ router = APIRouter(prefix="/measure", tags=["frame"], responses=documented(404, 
 SNAP = 0.3  # m; what is farther away was not meant
 MIXED = "One place is of the scan, the other of the map: give two of the scan, or two of the map."
 NO_WALLS = (
-    "The frame shows no walls of a map: set navigation.mode to slam and navigation.method to scans, and wait."
+    "No map is being made whose walls can be measured: set navigation.mode to slam and navigation.method to scans, and "
+    "wait. A map that is kept does not say how its walls err together."
 )
 
 _Candidates = tuple[list[Feature], list[int], Array]  # each with its id, and its place (N, 2) m that is meant

@@ -83,9 +83,14 @@ async def _wanted(
 def _asked(
     server: Server,
     session: Annotated[
-        int | None, Query(description="of a map that is kept; if not given of the one that SLAM makes now")
+        int | None,
+        Query(
+            description="of a map that is kept; if not given of the one that is made, or localized in, now"
+        ),
     ] = None,
 ) -> WallTable:
+    if session is None and server.runtime.settings.navigation.mode == "localize":
+        session = server.runtime.navigation.session
     return running_walls(server.runtime) if session is None else server.landmarks.walls(session)
 
 
@@ -107,7 +112,9 @@ def walls(
         Literal["json", "csv", "geojson"], Query(description="m, rad, s in all of them")
     ] = "json",
 ) -> Response:
-    """The walls of the map that SLAM makes of whole scans, all or those asked for. 404 if it makes none.
+    """The walls of the map that SLAM makes of whole scans, or that the sensor is localized in; all or those asked for.
+
+    404 if there is no such map.
 
     A wall is in a box or circle if any part of it is. With a session those are kept that three scans of the map saw.
     """

@@ -1,6 +1,7 @@
 """How far the poses of a map are from reference poses, and from relations between scans verified by hand."""
 
 import gzip
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -93,7 +94,8 @@ def read_relations(path: Path) -> Relations:
     """
     opened = gzip.open if path.suffix == ".gz" else open
     try:
-        with opened(path, "rt") as file:
+        with opened(path, "rt") as file, warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # of an empty file, which is refused below
             table = np.loadtxt(file, ndmin=2)
     except ValueError as error:
         reason = str(error).rstrip(".")

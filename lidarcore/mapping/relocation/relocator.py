@@ -20,6 +20,7 @@ Verdict = Literal["found", "too few points", "no fit", "several places"]
 _APART = (0.8, 0.35)  # m, rad: poses closer than both are one place
 _MOST_PLACES = 12  # where the points fit, from which on nothing tells them apart
 _SURE = 40.0  # log-likelihood ratio that the best of all wrong places reaches for one in 130 scans of another building
+_BEYOND = 1e9  # cells; farther away is as far as that
 _SIGMAS = 3.0  # of a guess, within which a pose is looked for
 _NEAR_LEVEL = 3  # of the squares in which it is, at least
 
@@ -155,7 +156,7 @@ class Relocator:
     def _as_guessed(self, query: Query, at: Array) -> Relocation:
         """How well a pose (3,) in cells of the field fits, which is not found."""
         columns, rows = _turned(query.points / self._grid.resolution, at[2:])
-        column, row = np.floor(at[:2]).astype(int).tolist()
+        column, row = np.floor(np.clip(at[:2], -_BEYOND, _BEYOND)).astype(int).tolist()
         fit = fit_at(self._field.levels[0], columns[0], rows[0], column, row, 0) / FULL / len(query.points)
         return replace(_nowhere("no fit"), fit=fit, against=self._place(query, fit, at).against)
 
