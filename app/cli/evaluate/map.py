@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, numbers, settings_from
+from ..options import MOST, RecordingPath, Set, SettingsFile, Topic, numbers, plural, settings_from
 from ..progress import counting
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":
     from lidarcore.evaluation.intervals import LEVEL
     from lidarcore.geometry import chi_square_gate
 
-    yield "scans", f"{judged.scans}, {judged.tracked} of them tracked; {judged.keyframes} keyframes"
+    yield "scans", f"{judged.scans}, {judged.tracked} of them tracked; {plural(judged.keyframes, 'keyframe')}"
     wrong = "" if judged.wrong is None else f", {judged.wrong} of them wrong"
     yield "loops", f"{judged.loops}{wrong}"
     yield "processor time", f"{judged.seconds:.1f} s; at most {judged.megabytes:.0f} MB"
