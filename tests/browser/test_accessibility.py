@@ -109,10 +109,15 @@ def test_what_is_selected_elsewhere_leaves_the_tabs_of_a_phone_free(phone: Visit
     expect(card).to_be_visible()
     tabs = phone.page.get_by_role("tablist").bounding_box()
     assert card.bounding_box()["y"] >= tabs["y"] + tabs["height"]
+    fold = card.get_by_role("button", name="Fold the inspector")
+    expect(fold).to_have_attribute("aria-expanded", "true")
     phone.page.get_by_role("tab", name="Setup").tap()
-    expect(phone.page.get_by_label("Fitter")).to_be_in_viewport()
-    card.get_by_role("button", name="Fold the inspector").tap()
-    expect(card.get_by_role("table").first).to_be_visible()
+    expect(fold).to_have_attribute("aria-expanded", "false")
+    fitter = phone.page.get_by_label("Fitter")
+    expect(fitter).to_be_in_viewport()
+    assert fitter.bounding_box()["y"] + fitter.bounding_box()["height"] <= card.bounding_box()["y"]
+    fold.tap()
+    expect(card.get_by_role("button", name="Compare with the next scans")).to_be_visible()
 
 
 @pytest.mark.long
