@@ -11,6 +11,7 @@ import { inspectedWall, mountInspectedWall } from "./inspected-wall.js";
 import { lookNow } from "./scene.js";
 import { claimsOf, plotScatter, scatterDrawing } from "./scatter.js";
 import { get, on } from "./store.js";
+import { wide } from "./tabs.js";
 
 const SHOWN = ["frame", "selection", "wall", "mapped", "mappedWall", "wallHistory", "length", "repeatability", "deviations", "wallDeviations", "settings"];
 
@@ -46,10 +47,8 @@ export function mountInspector() {
   new ResizeObserver(foldLegend).observe($("inspector"));
   $("legend").addEventListener("toggle", () => $("legend").open && isOnLegend() && setFolded(true));
   for (const key of SHOWN) on([key], refresh);
-  on(["panel"], () => isOverPanels() && setFolded(true));
+  on(["panel"], () => wide.matches || setFolded(true)); // on a narrow page it lies over the panels
 }
-
-const isOverPanels = () => !matchMedia("(min-width: 900px)").matches;
 
 function refresh() {
   const frame = get("frame");
@@ -57,7 +56,7 @@ function refresh() {
   $("inspector").hidden = !thing;
   if (thing?.key !== shown) {
     standAside(thing);
-    if (isOverPanels()) setFolded(false);
+    if (!wide.matches) setFolded(false);
   }
   if (thing) draw(thing);
 }

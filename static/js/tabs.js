@@ -5,7 +5,9 @@ import { set } from "./store.js";
 
 const KEY = "panel"; // what a reload brings back
 
-const wide = matchMedia("(min-width: 900px)");
+/** Whether the panels stand beside the view, not below it. */
+export const wide = matchMedia("(min-width: 900px)");
+
 const tabs = () =>
   [...document.querySelectorAll('[role="tab"]')].filter((tab) => !(wide.matches && tab.id === "tab-corners"));
 

@@ -183,6 +183,7 @@ def test_near_a_guess_only_places_near_it_are_rivals():
     assert relocator.find_near(query, guess(pose, 3.0)).verdict == "several places"
 
 
+@pytest.mark.filterwarnings("error")
 def test_a_guess_where_the_sensor_is_not_is_contradicted():
     room, pose = furnished_room(), np.array([7.6, 4.4, 1.0])
     relocator, query = Relocator(furnished()), query_of([scan_at(room, pose)])
@@ -192,6 +193,7 @@ def test_a_guess_where_the_sensor_is_not_is_contradicted():
         pose + np.array([-1.5, 0.5, 0.0]),
         pose + np.array([0, 0, 1.5]),
         pose + np.array([40.0, 0.0, 0.0]),
+        pose + np.array([1e300, 0.0, 0.0]),
     ):
         found = relocator.find_near(query, guess(wrong))
         assert not found.found

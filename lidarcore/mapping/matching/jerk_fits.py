@@ -114,8 +114,10 @@ def _fit(
 
 @kernel
 def _whiten(S: Array, X: Array) -> float:
-    """Makes X (n, m) that which has the identity for its covariance, S (n, n) being it before, of which only the lower
-    triangle counts; S becomes its Cholesky factor. Returns half the logarithm of its determinant."""
+    """Divides X (n, m) by the Cholesky factor L of S (n, n) = L L^T, from the left; returns the logarithm of det L.
+
+    Only the lower triangle of S counts, and becomes L.
+    """
     n, logs = len(S), 0.0
     for j in range(n):
         for i in range(j, n):

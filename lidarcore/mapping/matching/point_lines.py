@@ -13,7 +13,7 @@ SLANTED = 0.0
 _FARTHEST = 3.0  # m between two of them
 _STRAIGHT = 9.0  # squared standard deviations by which the middle one of three is off their line, at most
 _RELIEF = 0.01  # m by which walls are off lines of that length
-_ROUGH = 5.0  # standard deviations by which points scatter more about a line than noise alone makes them, if it is not
+_ROUGH = 5.0  # standard deviations of chi-square by which points of a rough surface scatter more than noise makes them
 
 
 @kernel
@@ -76,10 +76,10 @@ def add_slanted(points: Array, bearings: Array, spacing: float, noise: Array, si
 
 @kernel
 def add_scatter(single: Array) -> None:
-    """Adds to the variances of lines what their points scatter more than noise makes them.
+    """Enlarges the variances of lines whose points scatter more than noise makes them.
 
-    Of few points the scatter is 1.5 times as large as usual here, and half as large there, where noise is all there is:
-    it is believed only where it is significantly more than that of most lines of the scan.
+    By noise alone, the scatter of few points is half as large as expected here and 1.5 times there: it counts only
+    where it is significantly more than noise makes it, or than it is for most lines of the scan if that is less.
     """
     usual = min(_usual_scatter(single), 1.0)
     for row in single:

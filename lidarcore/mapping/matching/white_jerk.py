@@ -16,11 +16,12 @@ _AT, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # exact for products of two 
 @kernel
 def wander(t: Array, h: Array, near: Array, far: Array) -> None:
     """Writes covariances (T, K + 2, K + 2) of what white jerk of density 1 adds to what sweeps show: K mean places, m;
-    the speed, m/s; and how the first is bent, m/s².
+    the speed, m/s; and the bend, m/s².
 
-    Mean places are those of sweeps around t (T, K) s, each h (T,) s before and after. The speed is that of the line
-    through the sweep around 0 s. A sweep that is bent begins where one of a higher acceleration would, seen from its
-    mean place. `near` is by jerk that is no farther from 0 s than the nearest of the other sweeps, `far` by the rest.
+    Mean places are those of sweeps around t (T, K) s, each h (T,) s before and after. Speed and bend are of the sweep
+    around 0 s: the slope of the line through it, and by how much a steady acceleration would have to be higher for the
+    sweep to begin where it begins, seen from its mean place. `near` is by jerk that is no farther from 0 s than the
+    nearest of the other sweeps, `far` by the rest.
     """
     K = t.shape[1]
     edges, added = np.empty(2 * K + 3), np.empty(K + 2)
