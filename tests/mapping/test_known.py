@@ -25,6 +25,11 @@ def chain(nodes):
     return graph
 
 
+def everywhere(graph):
+    """Reaches (K,) of keyframes that see all of the world."""
+    return np.full(len(graph), 1e3)
+
+
 def steps(graph):
     """Covariances of a chain's edges."""
     return np.array([graph.edge(number).covariance for number in range(len(graph) - 1)])
@@ -32,7 +37,7 @@ def steps(graph):
 
 def test_parts_are_known_as_far_as_the_graph_says():
     graph = chain(160)
-    found = known(graph, 0.5, steps(graph))
+    found = known(graph, 0.5, steps(graph), everywhere(graph))
     middles = np.arange(10) * 16 + 8
     for a, i in enumerate(middles):
         for b, j in enumerate(middles):
@@ -50,10 +55,12 @@ def test_a_part_ends_where_the_step_to_the_next_keyframe_is_vague():
     graph = PoseGraph()
     for k, P in enumerate(covariances):
         graph.connect(k, graph.add([0.5 * (k + 1), 0, 0]), [0.5, 0, 0], P)
-    found = known(graph, 0.3, covariances)
+    found = known(graph, 0.3, covariances, everywhere(graph))
     assert found.part.tolist() == [0] * 9 + [1] * 6
     assert not found.pairs[0, 1]
-    found = known(graph, 0.4, covariances)  # 0.16: the sum goes beyond at the tenth keyframe, no step does
+    found = known(
+        graph, 0.4, covariances, everywhere(graph)
+    )  # 0.16: the sum goes beyond at the tenth keyframe, no step does
     assert found.part.tolist() == [0] * 9 + [1] * 6
     assert found.pairs.all()
 
@@ -66,20 +73,44 @@ def test_keyframes_near_others_that_are_not_known_from_there_are_found():
     graph.move(poses)
     pairs = np.ones((10, 10), bool)
     pairs[0, 9] = pairs[9, 0] = False
-    found = near_unknown(graph, Known(np.arange(160) // 16, pairs), 2.0)
+    found = near_unknown(graph, Known(np.arange(160) // 16, pairs, everywhere(graph)), 2.0)
     assert (found == np.arange(144, 160)).all()
+
+
+def test_parts_too_far_apart_to_have_seen_one_surface_are_not_told_of():
+    """A straight way in parts of 7.5 m, 8 m apart, that saw 2 m far: by hand, neighbours alone, however sure it is."""
+    graph = chain(160)
+    short = np.full(160, 2.0)
+    found = known(graph, 1e3, steps(graph), short)
+    numbers = np.arange(10)
+    assert (found.pairs == (np.abs(numbers[:, None] - numbers) <= 1)).all()
+    assert (near_unknown(graph, found, 20.0) == []).all()
+    vague = found._replace(pairs=np.eye(10, dtype=bool))
+    assert (near_unknown(graph, vague, 0.6) == np.arange(16, 160, 16)).all()
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_all_parts_that_may_have_seen_one_surface_are_told_of(seed):
+    """By brute force: two keyframes may have seen one surface if the circles that they saw meet."""
+    rng = np.random.default_rng(seed)
+    graph, reaches = chain(64), rng.uniform(0, 4, 64)
+    bent = rng.uniform(0, 0.3) * np.arange(64)
+    graph.move(np.stack([*np.cumsum([0.5 * np.cos(bent), 0.5 * np.sin(bent)], axis=1), bent], -1))
+    found = known(graph, 1e3, steps(graph), reaches)
+    apart = np.hypot(*(graph.poses[:, None, :2] - graph.poses[:, :2]).T)
+    meet = apart < reaches[:, None] + reaches
+    assert found.pairs[found.part[:, None], found.part][meet].all()
 
 
 def test_a_loop_makes_the_way_home_known():
     graph = chain(160)
-    parts = known(graph, 1.0, steps(graph))
+    parts = known(graph, 1.0, steps(graph), everywhere(graph))
     assert not parts.pairs[0, 9]
     graph.connect(0, 159, relative(graph.poses[0], graph.poses[159]), STEP, doubted=True)
     graph.optimize()
-    assert known(graph, 1.0, steps(graph)).pairs[0, 9]
-    assert (
-        known_besides(parts, graph, 1.0).pairs == (parts.pairs | known(graph, 1.0, steps(graph)).pairs)
-    ).all()
+    now = known(graph, 1.0, steps(graph), everywhere(graph))
+    assert now.pairs[0, 9]
+    assert (known_besides(parts, graph, 1.0).pairs == (parts.pairs | now.pairs)).all()
     assert (known_besides(parts, chain(160), 0.0).pairs == parts.pairs).all()
 
 

@@ -19,7 +19,7 @@ def test_wheels_that_contradict_what_was_seen_count_less(off, weight):
     graph.add(SEEN.pose)
     steps = Steps(graph)
     steps.add(0, 1, UncertainPose(SEEN.pose + np.array([off * SIGMA[0], 0, 0]), np.diag(SIGMA**2)), SEEN)
-    together = Known(np.zeros(2, np.int64), np.ones((1, 1), bool))
+    together = Known(np.zeros(2, np.int64), np.ones((1, 1), bool), np.ones(2))
     (step,) = steps.besides(together)
     np.testing.assert_allclose(step.covariance, np.diag(SIGMA**2) / weight, rtol=1e-3)
     graph.move(graph.poses + np.array([[0, 0, 0], [3.0, 0, 0]]))  # however the poses move
@@ -32,5 +32,5 @@ def test_what_need_not_be_the_same_surfaces_is_tied_by_what_was_seen():
     graph.add(SEEN.pose)
     steps = Steps(graph)
     steps.add(0, 1, UncertainPose(SEEN.pose, np.diag(SIGMA**2)), SEEN)
-    (step,) = steps.besides(Known(np.arange(2), np.eye(2, dtype=bool)))
+    (step,) = steps.besides(Known(np.arange(2), np.eye(2, dtype=bool), np.ones(2)))
     assert np.array_equal(step.covariance, SEEN.covariance)

@@ -28,25 +28,27 @@ class JointPoses(Protocol):
 class Known(NamedTuple):
     """Which parts of a way are known, seen from each other.
 
-    part   (K,) number of the part that each keyframe is of
-    pairs  (S, S) of the parts
+    part     (K,) number of the part that each keyframe is of
+    pairs    (S, S) of the parts; not told of two that lie too far apart to have seen a surface both
+    reaches  (K,) m, how far each keyframe saw
     """
 
     part: Ints
     pairs: Bools
+    reaches: Array
 
 
-def known(joint: JointPoses, within: float, steps: Array) -> Known:
+def known(joint: JointPoses, within: float, steps: Array, reaches: Array) -> Known:
     """The parts of a way; two are known if the place of one, seen from the other, has a deviation below `within` m.
 
     steps (K - 1, 3, 3) are the covariances of the keyframes, each seen from the one before it. Neighbours are known if
-    the step between them is.
+    the step between them is. reaches (K,) m tell how far each keyframe saw.
     """
     part, reached = _parts(steps[:, 0, 0] + steps[:, 1, 1], within**2)
     pairs = np.eye(part[-1] + 1, dtype=bool)
     a = np.flatnonzero(reached)
     pairs[a, a + 1] = pairs[a + 1, a] = True
-    return known_besides(Known(part, pairs), joint, within)
+    return known_besides(Known(part, pairs, reaches), joint, within)
 
 
 def _parts(variances: Array, most: float) -> tuple[Ints, Bools]:
@@ -67,7 +69,7 @@ def _parts(variances: Array, most: float) -> tuple[Ints, Bools]:
 def known_besides(parts: Known, joint: JointPoses, within: float) -> Known:
     """The same parts, of which those are known that were before, and those that the joint poses know now."""
     pairs = parts.pairs.copy()
-    for b, a in np.argwhere(np.tril(~pairs)).tolist():
+    for b, a in np.argwhere(np.tril(_overlap(parts, joint.poses) & ~pairs)).tolist():
         pairs[b, a] = pairs[a, b] = _is_known(joint, _middle(parts, a), _middle(parts, b), within)
     return parts._replace(pairs=pairs)
 
@@ -75,11 +77,22 @@ def known_besides(parts: Known, joint: JointPoses, within: float) -> Known:
 def near_unknown(joint: JointPoses, known: Known, distance: float) -> Ints:
     """Keyframes within a distance in m of earlier ones that are not known, seen from there."""
     places, part, found = joint.poses[:, :2], known.part, []
+    unknown = _overlap(known, joint.poses) & ~known.pairs
     for k, place in enumerate(places):
-        others = places[:k][~known.pairs[part[k], part[:k]]]
+        others = places[:k][unknown[part[k], part[:k]]]
         if (np.hypot(*(others - place).T) < distance).any():
             found.append(k)
     return np.array(found, np.int64)
+
+
+def _overlap(parts: Known, poses: Array) -> Bools:
+    """(S, S): whether what two parts saw from poses (K, 3) lies in circles that overlap: else no surface is of both."""
+    begins = np.flatnonzero(np.diff(parts.part, prepend=-1))
+    centres = np.add.reduceat(poses[:, :2], begins) / np.bincount(parts.part)[:, None]
+    farthest = np.hypot(*(poses[:, :2] - centres[parts.part]).T) + parts.reaches
+    radii = np.maximum.reduceat(farthest, begins)
+    found: Bools = np.hypot(*(centres[:, None] - centres).T) < radii[:, None] + radii
+    return found
 
 
 def _middle(parts: Known, number: int) -> int:

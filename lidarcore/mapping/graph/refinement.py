@@ -119,7 +119,7 @@ def refine(
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
     surfaces = Surfaces(_observations(scans, since, assumed**2), islands, size, known)
-    poses, scale, unevenness = poses.copy(), 1.0, 0.005
+    poses, scale, unevenness, before = poses.copy(), 1.0, 0.005, np.inf
     for _ in range(rounds):
         equations = normal_equations(surfaces, poses, Noise(scale, unevenness**2))
         H, g = _with_steps(equations, poses, steps)
@@ -127,8 +127,11 @@ def refine(
         poses = poses + step.reshape(-1, 3)
         poses[:, 2] = wrap(poses[:, 2])
         scale, unevenness = _measured(equations.groups, len(poses))
-        if -g @ step < _SETTLED * len(g):
+        size = float(-g @ step) / len(g)
+        # Cells are cut anew in each round, which alone moves poses of a large building by some tenths of a deviation.
+        if size < _SETTLED or size >= before:
             break
+        before = size
     equations = normal_equations(surfaces, poses, Noise(scale, unevenness**2))
     recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
     speeds = speeds_left(surfaces, poses, Noise(scale, unevenness**2))

@@ -154,7 +154,9 @@ class BackEnd:
         return refined
 
     def _parts(self) -> Known:
-        return known(self.graph, self._settings.front.match.reach, self._steps.covariances())
+        means = (keyframe.patches.means for keyframe in self.keyframes.values())
+        reaches = np.array([np.hypot(*of_one.T).max(initial=0.0) for of_one in means])
+        return known(self.graph, self._settings.front.match.reach, self._steps.covariances(), reaches)
 
     def _refined(self, parts: Known) -> Refined:
         match, sweeps = self._settings.front.match, [keyframe.sweep for keyframe in self.keyframes.values()]
