@@ -14,10 +14,10 @@ from lidarcore.localization import from_stored as landmarks_from_stored
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
-from .map_file import grid_of, landmarks_of
+from .map_file import building_of, landmarks_of
 from .map_writer import MapWriter
 from .session_writer import MapChange, SessionWriter
-from .wall_writer import WallWriter, from_stored, grid_from_stored, grid_to_stored
+from .wall_writer import WallWriter, from_stored, grid_from_stored, grid_to_stored, to_stored
 from .write_queue import WriteQueue
 
 PATIENCE = 2.0  # s to wait while another process writes
@@ -141,17 +141,21 @@ class LandmarkStore:
     def load(self, path: Path, format: str, name: str) -> Session:
         """A file of a map as a session of its own: landmarks in one of FORMATS, or a "zip" of a grid as ROS has it.
 
+        Walls that are in the zip come along.
+
         Raises MapFileError or GridError; nothing is kept of it then.
         So also for a file without landmarks: as the newest map it would be the one that is asked.
         """
-        grid = grid_of(path) if format == "zip" else None
-        found = [] if grid else landmarks_of(path, format)
-        if not (grid or found):
+        building = building_of(path) if format == "zip" else None
+        found = [] if building else landmarks_of(path, format)
+        if not (building or found):
             raise MapFileError(f"This {format} holds no landmarks: export a map that has some.")
         now = time.time()
         loaded = self.atlas.begin(name, now, "import", found)
-        if grid:
-            loaded.put_grid(grid_to_stored(grid))
+        if building:
+            grid = grid_to_stored(building.grid)
+            walls = [] if building.walls is None else to_stored(building.walls)
+            loaded.put_walls(walls, grid)
         self.atlas.end(loaded.session, now)
         return self.atlas.session(loaded.session)
 

@@ -6,17 +6,21 @@ from contextlib import closing
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
+from typing import NamedTuple
 from zipfile import BadZipFile, ZipFile
 
 from lidarcore.errors import MapFileError
 from lidarcore.landmarks import Landmark, read_landmarks
+from lidarcore.mapping.export import read_walls_csv
 from lidarcore.mapping.grid import OccupancyGrid, read_ros_map
+from lidarcore.mapping.walls import WallTable
 
 from ..isolation import Isolated
 
 MOST = 250_000  # landmarks, which take 100 MB; a house has some hundred
 _YAMLS = (".yaml", ".yml")
 _PARTS = (*_YAMLS, ".pgm", ".png", ".bmp")
+_WALLS = "walls.csv"  # beside the YAML
 _MOST_PARTS, _MOST_BYTES = 20, 200_000_000  # of a zip, unpacked
 _TOGETHER = 1000  # landmarks that come over at a time
 
@@ -32,22 +36,34 @@ def landmarks_of(path: Path, format: str) -> list[Landmark]:
     return found
 
 
-def grid_of(path: Path) -> OccupancyGrid:
-    """The grid of a zip with a YAML and its image, as ROS has them. Raises MapFileError or GridError."""
-    with closing(Isolated("the map", MapFileError, _read_grid, path)) as reading:
+class Building(NamedTuple):
+    """A grid, and the walls that came with it."""
+
+    grid: OccupancyGrid
+    walls: WallTable | None
+
+
+def building_of(path: Path) -> Building:
+    """The grid of a zip with a YAML and its image, as ROS has them, and the walls if walls.csv is there as well.
+
+    Raises MapFileError or GridError.
+    """
+    with closing(Isolated("the map", MapFileError, _read_building, path)) as reading:
         return next(iter(reading))
 
 
-def _read_grid(path: Path) -> Iterator[OccupancyGrid]:
+def _read_building(path: Path) -> Iterator[Building]:
     with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder:
-        yield read_ros_map(_unpacked(path, Path(folder)))
+        yaml = _unpacked(path, Path(folder))
+        walls = yaml.with_name(_WALLS)
+        yield Building(read_ros_map(yaml), read_walls_csv(walls) if walls.is_file() else None)
 
 
 def _unpacked(path: Path, folder: Path) -> Path:
-    """The only YAML of a zip, unpacked with the images into a folder; other files stay where they are."""
+    """The only YAML of a zip, unpacked with the images and walls.csv into a folder; other files stay where they are."""
     try:
         with ZipFile(path) as archive:
-            parts = [part for part in archive.infolist() if Path(part.filename).suffix.lower() in _PARTS]
+            parts = [part for part in archive.infolist() if _is_read(Path(part.filename))]
             yamls = [part for part in parts if Path(part.filename).suffix.lower() in _YAMLS]
             if len(yamls) != 1:
                 raise MapFileError(
@@ -60,6 +76,10 @@ def _unpacked(path: Path, folder: Path) -> Path:
             return [Path(archive.extract(part, folder)) for part in (*parts, *yamls)][-1]
     except (BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
         raise MapFileError(f"This zip cannot be read: {error}.") from error
+
+
+def _is_read(part: Path) -> bool:
+    return part.suffix.lower() in _PARTS or part.name == _WALLS
 
 
 def _read(path: Path, format: str) -> Iterator[list[Landmark]]:

@@ -63,6 +63,9 @@ class MapStore(Protocol):
     def grid(self, session: int) -> OccupancyGrid | None:
         """The grid of a session, if it has one. Raises LandmarkMapError."""
 
+    def walls(self, session: int) -> WallTable:
+        """The walls that a session has, if any. Raises UnknownSessionError."""
+
     def landmarks(self, session: int) -> Landmarks:
         """The map of a session. Raises UnknownSessionError."""
 
@@ -279,6 +282,7 @@ class Navigation:
     def _navigator_in(self, session: int, settings: Settings) -> Navigator | WholeScans | None:
         """What localizes in the map of a session: whole scans if it has a grid, else landmarks, if there are any."""
         if (grid := self._store.grid(session)) is not None:
-            return WholeScans(settings.extraction, known=MapPicture(grid))
+            walls = self._store.walls(session)
+            return WholeScans(settings.extraction, known=MapPicture(grid, walls if len(walls) else None))
         known = self._store.landmarks(session)
         return Navigator(settings.navigation, known) if known else None

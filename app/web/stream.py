@@ -11,7 +11,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lidarcore.errors import LocalizationError
 from lidarcore.landmarks import Landmark
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.walls import WallTable
 
 from ..errors import explained
 from ..jobs.landmark_store import LandmarkStore
@@ -120,7 +120,7 @@ class Hub:
         self._mailboxes: set[Mailbox] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._session: int | None = None  # that was written to last
-        self._walls: Walls | None = None  # of the map that the newest frame shows
+        self._walls: WallTable | None = None  # of the map that the newest frame shows
         runtime.frame_listeners.append(self._shown)
         landmarks.listeners.append(self._written)
         runtime.change_listeners.append(lambda: self._post(Mailbox.put_state))
@@ -228,7 +228,7 @@ class Hub:
             put(mailbox, *args)
 
 
-def _walls_of(frame: Frame) -> Walls | None:
+def _walls_of(frame: Frame) -> WallTable | None:
     return frame.picture.walls if frame.picture else None
 
 

@@ -35,12 +35,17 @@ class WallJson(TypedDict):
     count: int
 
 
-def walls_text(walls: Walls | None) -> str:
-    """The walls of a map, and the corners where two of them meet, with the ids of both; none where there is no map."""
+def walls_text(walls: WallTable | None) -> str:
+    """The walls of a map, and the corners where two of them meet, with the ids of both; none where there is no map.
+
+    Of a map that is kept it is not known which walls meet.
+    """
     if walls is None:
         return to_json({"walls": [], "corners": []}).decode()
-    corners = zip(walls.corners.xy.tolist(), walls.ids[walls.corners.walls].tolist(), strict=True)
-    met = [{"at": at, "walls": pair} for at, pair in corners]
+    met = []
+    if isinstance(walls, Walls):
+        corners = zip(walls.corners.xy.tolist(), walls.ids[walls.corners.walls].tolist(), strict=True)
+        met = [{"at": at, "walls": pair} for at, pair in corners]
     return to_json({"walls": wall_rows(walls, range(len(walls))), "corners": met}).decode()
 
 

@@ -107,12 +107,6 @@ class LandmarkMap:
             raise UnknownWallError(f"Session {self.session} has no history of a wall {id}.")
         return found
 
-    def put_grid(self, grid: StoredGrid) -> None:
-        """Store an occupancy grid in place of that which the map has. Raises UnknownSessionError if it was deleted."""
-        with self._database.writing() as connection:
-            self._check(connection)
-            replace_grid(connection, self.session, grid)
-
     def grid(self) -> StoredGrid | None:
         """The occupancy grid, if there is one."""
         with self._database.reading() as connection:

@@ -13,7 +13,7 @@ import { zipped } from "./zip.js";
 const BUILDING = { zip: "ROS map, walls and plan", png: "Picture" };
 const FORMATS = { json: "JSON", csv: "CSV", geojson: "GeoJSON", png: "Picture", zip: "ROS map" };
 const OF_GRID = { zip: "ROS map", png: "Picture" };
-const OF_WALLS = { ...OF_GRID, svg: "Plan, SVG", dxf: "Plan, DXF" };
+const OF_WALLS = { ...BUILDING, svg: "Plan, SVG", dxf: "Plan, DXF" };
 const LOADED = ["json", "csv", "geojson", "zip"];
 const OF_ROS = ["yaml", "yml", "pgm", "png", "bmp"]; // which come together
 
@@ -95,11 +95,14 @@ function rows(sessions, { error }, live) {
   ];
 }
 
+const contentOf = ({ walls, grid, landmarks }) =>
+  walls ? `${wholeNumber(walls)} walls` : grid ? "a grid" : `${wholeNumber(landmarks)} landmarks`;
+
 function row({ id, source, mode, started, landmarks, walls, grid }, live) {
   const isBuilt = id === live.built;
   const isUsed = isBuilt || id === live.session;
   const count = isUsed ? Math.max(landmarks, live.landmarks) : landmarks;
-  const holds = walls ? `${wholeNumber(walls)} walls` : grid ? "a grid" : `${wholeNumber(count)} landmarks`;
+  const holds = contentOf({ walls, grid, landmarks: count });
   const button = el(
     "button",
     {
@@ -200,7 +203,7 @@ async function load(files) {
   if (!loaded) return;
   await list();
   const action = { label: "Localize in it", run: () => localizeIn(loaded.id) };
-  toast(`${name}: ${loaded.grid ? "a grid" : `${wholeNumber(loaded.landmarks)} landmarks`}`, {
+  toast(`${name}: ${contentOf(loaded)}`, {
     title: `Map ${loaded.id} is loaded`,
     action,
   });

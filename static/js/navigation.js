@@ -89,10 +89,11 @@ export function mountNavigation() {
     el("div", { class: "buttons" }, ...placingControls(), reset),
   );
   on(["fields"], (fields) => $("navigation").append(layerChips(fields, { ofMap: true })));
-  on(["settings", "localization"], ({ navigation }, localization) => {
+  on(["settings", "localization", "mapped"], ({ navigation }, localization, { walls }) => {
     const { mode, landmarks } = navigation;
     const wholeScans = isOfScans(navigation, localization);
-    $("map").dataset.of = mode === "off" ? "nothing" : !wholeScans ? "landmarks" : mode === "slam" ? "scans" : "grid";
+    const hasWalls = mode === "slam" || walls.length > 0; // a map that is localized in may have none
+    $("map").dataset.of = mode === "off" ? "nothing" : !wholeScans ? "landmarks" : hasWalls ? "scans" : "grid";
     methodRow.hidden = mode === "localize";
     landmarksRow.hidden = mode !== "localize" || wholeScans;
     motionRow.hidden = wholeScans || mode === "off";

@@ -127,7 +127,7 @@ function drawLegend(frame, settings, methods, sizes, localization) {
   const { localization: now, colour_scale: colours } = frame;
   const paths = PATHS.filter(({ layer, isKnown }) => now && layers[layer] && isKnown(now));
   const ofScans = isOfScans(settings.navigation, localization);
-  const ofWalls = ofScans && settings.navigation.mode === "slam"; // a known grid shows none
+  const ofWalls = ofScans && (settings.navigation.mode === "slam" || get("mapped").walls.length > 0);
   const mapped = MAPPED.filter(({ layer }) => now && layers[layer] && (layer === "walls" ? ofWalls : !ofScans));
   const ofScan = OF_SCAN.filter(({ layer, isKnown }) => layers[layer] && (isKnown?.(frame, settings) ?? true));
   const signs = [...ofScan, ...paths, ...mapped];

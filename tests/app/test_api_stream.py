@@ -65,7 +65,7 @@ def test_a_run_that_begins_is_told_of_though_nothing_else_changes(server: Server
     path = write_room(server.folder / "long.npz", scans=600)
     scans = list(islice(open_recording(path), 5))
     hall = server.app.state.server.landmarks.atlas.begin("hall", 1.0)
-    hall.put_grid(grid_to_stored(build_grid(scans, np.zeros((len(scans), 3)))))
+    hall.put_walls([], grid_to_stored(build_grid(scans, np.zeros((len(scans), 3)))))
     server.play(path)
     with server.stream() as stream:
         stream.state(lambda state: state["source"]["complete"])  # which is a change, too

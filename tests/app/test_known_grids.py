@@ -2,6 +2,7 @@
 
 import csv
 import io
+import tempfile
 from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
@@ -16,7 +17,9 @@ from serving import Server, assert_problem, wait_until
 
 from lidarcore import Scan
 from lidarcore.geometry import compose
+from lidarcore.mapping.export import MAP_FILES, walls_csv, write_map
 from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, shades_of, write_ros_map
+from lidarcore.mapping.walls import find_walls
 from lidarcore.recordings.writer import RecordingWriter
 from lidarcore.scan import Array
 from lidarcore.simulation.robot import SimulatedRobot
@@ -103,6 +106,44 @@ def test_a_map_of_ros_is_loaded_and_localized_in(driving: Server, grid: Occupanc
     # And to be told where it is: at a wrong place it is not tracked.
     driving.change("POST", "/pose", {"x": pose["x"], "y": pose["y"], "heading": pose["heading"]})
     assert_problem(driving.http.post("/pose", json={"x": 0, "y": 0, "heading": 0, "sigma_position": 0}), 422)
+
+
+def test_walls_of_a_map_that_is_loaded_again_are_localized_in_and_saved(
+    driving: Server, scans: list[Scan], grid: OccupancyGrid
+) -> None:
+    """What is saved of a map has all that was loaded; a wall that two scans saw at most is not taken for one."""
+    spread = np.tile(np.diag([0.01, 0.01, 0.002]) ** 2, (20, 1, 1))
+    walls = find_walls(scans[::10], poses(scans)[::10], spread, grid)
+    with tempfile.TemporaryDirectory() as folder:
+        write_map(folder, grid, walls)
+        body = packed(*((path.name, path.read_bytes()) for path in Path(folder).iterdir()))
+    kept = np.flatnonzero(walls.count >= 3)
+    session = driving.http.post("/map", params={"format": "zip"}, content=body).json()
+    assert session["walls"] == len(kept) > 5
+    driving.change("PUT", "/localization/map", {"session": session["id"]})
+    driving.change("PATCH", "/settings", LOCALIZE)
+    wait_until(lambda: tracked(driving.http), "it is tracked")
+    told = driving.get("/walls")["walls"]
+    assert [wall["id"] for wall in told] == walls.ids[kept].tolist()
+    np.testing.assert_allclose([wall["end"] for wall in told], walls.ends[kept, 1], rtol=1e-8)
+    with driving.stream() as stream:
+        assert stream.until("walls", bool)["walls"] == told
+    for path, query in (("/map", {"session": session["id"]}), ("/map/grid", {})):
+        back = driving.http.get(path, params=query | {"format": "zip"}).raise_for_status()
+        with ZipFile(io.BytesIO(back.content)) as archive:
+            assert set(archive.namelist()) == set(MAP_FILES)
+            assert archive.read("walls.csv").decode() == walls_csv(walls, kept)
+
+
+def test_a_zip_whose_walls_make_no_sense_is_refused_and_leaves_nothing(
+    shared_server: Server, ros_map: Path
+) -> None:
+    before = shared_server.get("/sessions")["sessions"]
+    image = ros_map.with_suffix(".pgm").read_bytes()
+    body = packed(("hall.yaml", ros_map.read_bytes()), ("hall.pgm", image), ("walls.csv", b"id\n1\n"))
+    answer = shared_server.http.post("/map", params={"format": "zip"}, content=body)
+    assert "walls.csv: It lacks the columns" in assert_problem(answer, 422)["detail"]
+    assert shared_server.get("/sessions")["sessions"] == before
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Walls of maps in the file of maps: kept, told again, and still there after the server was killed."""
 
+import io
 import math
 import sqlite3
 from collections.abc import Callable
@@ -7,6 +8,7 @@ from contextlib import closing
 from dataclasses import astuple, replace
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import httpx
 import numpy as np
@@ -168,9 +170,10 @@ def test_walls_are_those_of_the_map_that_the_sensor_is_localized_in(server: Serv
     wait_until(lambda: server.get("/localization")["session"] == run.session)
     assert server.get("/walls")["walls"][0]["length"] == stored(4).length
     assert server.get("/walls") == server.get("/walls", session=run.session)
-    files = assert_problem(server.http.get("/map/grid", params={"format": "zip"}), 404)["detail"]
-    assert "/map?format=zip" in files
     server.next_frame()
+    files = server.http.get("/map/grid", params={"format": "zip"}).raise_for_status()
+    with ZipFile(io.BytesIO(files.content)) as archive:
+        assert len(archive.read("walls.csv").splitlines()) == 2
     two = {"first": "map-wall@0,1", "second": "map-wall@1,0"}
     assert "A map that is kept" in assert_problem(server.http.get("/measure", params=two), 404)["detail"]
 

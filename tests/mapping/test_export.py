@@ -6,6 +6,7 @@ import json
 import os
 import resource
 import xml.etree.ElementTree as ElementTree
+from dataclasses import fields
 from functools import cache
 
 import ezdxf
@@ -16,10 +17,10 @@ from PIL import Image
 
 from lidarcore import ExtractionSettings, SensorNoise
 from lidarcore.errors import MapFileError, MeasureError
-from lidarcore.mapping.export import MAP_FILES, write_map
+from lidarcore.mapping.export import MAP_FILES, read_walls_csv, walls_csv, write_map
 from lidarcore.mapping.grid import build_grid
 from lidarcore.mapping.measure import Feature, angle, distance, feature, length
-from lidarcore.mapping.walls import Walls, find_walls, joint_spread
+from lidarcore.mapping.walls import Walls, WallTable, find_walls, joint_spread
 from lidarcore.simulation import SimulatedSensor
 from lidarcore.simulation.rooms import rectangular_room
 
@@ -185,3 +186,48 @@ def test_features_have_names_and_wrong_ones_are_refused():
             distance(walls, feature(first), feature(second))
     with pytest.raises(MeasureError):
         angle(walls, feature("wall-0"), feature("corner-0"))
+
+
+def test_walls_are_read_as_they_were_written(folder):
+    walls, read = room()[1], read_walls_csv(folder / "walls.csv")
+    for field in fields(WallTable):
+        np.testing.assert_allclose(getattr(read, field.name), getattr(walls, field.name), rtol=1e-8)
+    assert walls_csv(read) == walls_csv(walls)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "text"),
+    [
+        ("length_m", "wide", "Line 3 holds what is not a number"),
+        ("length_m", "nan", "Wall 2 lacks numbers that are finite"),
+        ("id", "0", "Two of the walls have the same id"),
+        ("id", "1.5", "Wall 2 lacks an id"),
+        ("count", "0", "Wall 2 lacks a count"),
+        ("ended_2", "2", "Wall 2 lacks ended and corner"),
+        ("var_r_m2", "-1e-6", "Wall 2 lacks variances"),
+        ("cov_alpha_r_rad_m", "1", "Wall 2 lacks a covariance"),
+    ],
+)
+def test_a_wall_that_makes_no_sense_is_named(folder, tmp_path, column, value, text):
+    rows = list(csv.DictReader(io.StringIO((folder / "walls.csv").read_text())))
+    rows[1][column] = value
+    with (tmp_path / "walls.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    with pytest.raises(MapFileError, match=text):
+        read_walls_csv(tmp_path / "walls.csv")
+
+
+def test_a_file_that_holds_no_walls_is_refused(folder, tmp_path):
+    (tmp_path / "poses.csv").write_text("stamp,x\n1,2\n")
+    with pytest.raises(MapFileError, match=r"lacks the columns alpha_rad, .*: save the walls anew"):
+        read_walls_csv(tmp_path / "poses.csv")
+    with pytest.raises(MapFileError, match=r"none\.csv cannot be read"):
+        read_walls_csv(tmp_path / "none.csv")
+    (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\xfa")
+    with pytest.raises(MapFileError, match=r"bytes\.csv cannot be read"):
+        read_walls_csv(tmp_path / "bytes.csv")
+    header = (folder / "walls.csv").read_text().partition("\n")[0]
+    (tmp_path / "empty.csv").write_text(f"{header}\n")
+    assert len(read_walls_csv(tmp_path / "empty.csv")) == 0

@@ -15,7 +15,7 @@ from starlette.responses import Response
 from lidarcore.mapping import MapPicture
 from lidarcore.mapping.export import MAP_FILES, write_map
 from lidarcore.mapping.grid import OccupancyGrid, shades_of
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.walls import WallTable
 
 from ...errors import NotFoundError
 from ...pipeline.runtime import Runtime
@@ -27,11 +27,11 @@ router = APIRouter(tags=["localization"], responses=documented(404, 422))
 
 NO_BUILDING = 'There is no map of whole scans: set navigation.mode to slam and navigation.method to "scans".'
 NOT_YET = "The map of whole scans has no {} yet: wait for further scans."
-KEPT = "The sensor is localized in a map that is kept: its walls are at /walls, its files at /map?format=zip."
+NO_WALLS = "The map that the sensor is localized in has no walls: its grid alone is at /map/grid?format=png."
 
 
 def running_picture(runtime: Runtime) -> MapPicture:
-    """Grid and walls of the map that is made now. Raises NotFoundError."""
+    """Grid and walls of the map that is made, or localized in, now. Raises NotFoundError."""
     wanted, found = runtime.settings.navigation, runtime.navigation.picture
     if found is not None:
         return found
@@ -39,12 +39,12 @@ def running_picture(runtime: Runtime) -> MapPicture:
     raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
 
 
-def running_walls(runtime: Runtime) -> Walls:
-    """The walls of the map that is made now. Raises NotFoundError."""
+def running_walls(runtime: Runtime) -> WallTable:
+    """The walls of the map that is made, or localized in, now. Raises NotFoundError."""
     found = running_picture(runtime).walls
     if found is None:
         is_made = runtime.settings.navigation.mode == "slam"
-        raise NotFoundError(NOT_YET.format("walls") if is_made else KEPT)
+        raise NotFoundError(NOT_YET.format("walls") if is_made else NO_WALLS)
     return found
 
 
@@ -74,7 +74,7 @@ async def grid(
     return await anyio.to_thread.run_sync(make, limiter=server.heavy)
 
 
-def _zip(grid: OccupancyGrid, walls: Walls) -> Response:
+def _zip(grid: OccupancyGrid, walls: WallTable) -> Response:
     file = io.BytesIO()
     with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder, ZipFile(file, "w") as archive:
         write_map(folder, grid, walls)

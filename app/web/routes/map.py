@@ -15,7 +15,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.responses import FileResponse
 
 from lidarcore.landmarks import LandmarkMap, Session, export_map, export_picture
-from lidarcore.mapping.export import plan_dxf, plan_svg
+from lidarcore.mapping.export import corner_places, plan_dxf, plan_svg, write_map
 from lidarcore.mapping.grid import OccupancyGrid, shades_of, write_ros_map
 from lidarcore.mapping.walls import WallTable
 
@@ -65,7 +65,8 @@ async def download(
     format: Annotated[
         Literal["json", "csv", "geojson", "png", "svg", "dxf", "zip"],
         Query(
-            description="zip: image and map.yaml as ROS map_server reads them; png: the picture alone; "
+            description="zip: image and map.yaml as ROS map_server reads them, and its walls as files; png: the "
+            "picture alone; "
             "svg, dxf: the floor plan of its walls, in m"
         ),
     ] = "json",
@@ -104,7 +105,7 @@ async def upload(
         Literal["json", "csv", "geojson", "zip"] | None,
         Query(
             description="of the body, by its Content-Type or else JSON if not given; zip: a grid, map.yaml with its "
-            "image as ROS and `lidarcore map` write them"
+            "image as ROS and `lidarcore map` write them, and walls.csv if it is there"
         ),
     ] = None,
     name: Annotated[
@@ -155,18 +156,24 @@ def _write(landmarks: LandmarkStore, landmark_map: LandmarkMap, path: Path, reso
     if format in PLANS:
         path.write_text(_plan(landmarks.walls(session), session, format), "utf-8")
     elif format in PICTURES:
-        _draw(landmark_map, landmarks.grid(session), path, resolution)
+        _draw(landmark_map, landmarks.grid(session), landmarks.walls(session), path, resolution)
     else:
         _check_landmarks(landmarks.atlas.session(session))
         export_map(landmark_map, path)
 
 
 def _draw(
-    landmark_map: LandmarkMap, grid: OccupancyGrid | None, path: Path, resolution: float | None
+    landmark_map: LandmarkMap,
+    grid: OccupancyGrid | None,
+    walls: WallTable,
+    path: Path,
+    resolution: float | None,
 ) -> None:
-    """The picture of a map, or a zip of it and of what says where it is."""
+    """The picture of a map, or a zip of it, of what says where it is, and of its walls if there are any."""
     if grid is None:
         export_picture(landmark_map, path.with_suffix(".png"), resolution or RESOLUTION, MOST_PIXELS)
+    elif path.suffix == ".zip" and len(walls):
+        write_map(path.parent, _in_pixels(grid, resolution), walls)
     elif path.suffix == ".zip":
         write_ros_map(_in_pixels(grid, resolution), path.with_suffix(".yaml"))
     else:
@@ -198,8 +205,7 @@ def _check_landmarks(session: Session) -> None:
 def _plan(walls: WallTable, session: int, format: str) -> str:
     if not len(walls):
         raise NotFoundError(f"Map {session} has no walls: no floor plan can be drawn of it.")
-    corners = np.unique(walls.ends[walls.in_corner].round(3), axis=0)  # where two walls end
-    return PLANS[format](walls.ends, corners, np.empty((0, 2)))
+    return PLANS[format](walls.ends, corner_places(walls), np.empty((0, 2)))
 
 
 def _pack(path: Path) -> None:

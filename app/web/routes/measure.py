@@ -150,9 +150,10 @@ def _of_map(frame: Frame, kind: str, at: Array) -> _Candidates:
 
 def _map(frame: Frame) -> Walls:
     """The walls that the frame shows. Raises NotFoundError."""
-    if frame.picture is None or frame.picture.walls is None:
+    walls = frame.picture.walls if frame.picture else None
+    if not isinstance(walls, Walls):
         raise NotFoundError(NO_WALLS)
-    return frame.picture.walls
+    return walls
 
 
 def _closest(at: Array, start: Array, end: Array) -> Array:

@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
 from lidarcore.mapping.grid import OccupancyGrid, shades_of
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.walls import Walls, WallTable
 
 _MARGIN = 1.0  # m around the plan
 _PIXELS = 1200  # width at which a browser shows it at first
@@ -16,6 +16,14 @@ _BARS = (0.5, 1, 2, 5, 10, 20, 50, 100)  # m, lengths of the scale
 _WALL, _CORNER, _PATH = (200, 30, 30), (20, 60, 200), (60, 160, 190)  # colours of the picture
 _SMALLEST = 1500  # pixels that its longer side should have
 _LAYERS = {"WALLS": 7, "CORNERS": 1, "PATH": 5}  # and their colours in AutoCAD's index
+
+
+def corner_places(walls: WallTable) -> Array:
+    """Where walls meet (C, 2) m; of a map that was kept, where an end of a wall is a corner."""
+    if isinstance(walls, Walls):
+        return walls.corners.xy
+    places: Array = np.unique(walls.ends[walls.in_corner].round(6), axis=0)
+    return places
 
 
 def plan_svg(ends: Array, corners: Array, path: Array) -> str:
@@ -73,7 +81,7 @@ def plan_dxf(ends: Array, corners: Array, path: Array) -> str:
     return text.getvalue()
 
 
-def map_png(grid: OccupancyGrid, walls: Walls, path: Array) -> bytes:
+def map_png(grid: OccupancyGrid, walls: WallTable, path: Array) -> bytes:
     """The picture as PNG, y up; path (T, 2) m."""
     shades = shades_of(grid)
     zoom = max(1, _SMALLEST // max(shades.shape))
@@ -84,7 +92,7 @@ def map_png(grid: OccupancyGrid, walls: Walls, path: Array) -> bytes:
         draw.line(_pixels(grid, path, zoom), fill=_PATH, width=1)
     for ends in walls.ends:
         draw.line(_pixels(grid, ends, zoom), fill=_WALL, width=2)
-    for x, y in _pixels(grid, walls.corners.xy, zoom):
+    for x, y in _pixels(grid, corner_places(walls), zoom):
         draw.ellipse([x - 3, y - 3, x + 3, y + 3], outline=_CORNER)
     file = io.BytesIO()
     picture.save(file, "PNG")

@@ -9,19 +9,19 @@ from numpy.typing import ArrayLike
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
 from lidarcore.files import replacing_all
-from lidarcore.mapping.export.drawings import map_png, plan_dxf, plan_svg
+from lidarcore.mapping.export.drawings import corner_places, map_png, plan_dxf, plan_svg
 from lidarcore.mapping.export.tables import walls_csv, walls_geojson
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.grid.ros_map import ros_pgm, ros_yaml
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.walls import WallTable
 
-MAP_FILES: dict[str, Callable[[OccupancyGrid, Walls, Array], bytes]] = {
+MAP_FILES: dict[str, Callable[[OccupancyGrid, WallTable, Array], bytes]] = {
     "map.pgm": lambda grid, walls, path: ros_pgm(grid),
     "map.yaml": lambda grid, walls, path: ros_yaml(grid, "map.pgm").encode(),
     "walls.csv": lambda grid, walls, path: walls_csv(walls).encode(),
     "walls.geojson": lambda grid, walls, path: walls_geojson(walls).encode(),
-    "plan.svg": lambda grid, walls, path: plan_svg(walls.ends, walls.corners.xy, path).encode(),
-    "plan.dxf": lambda grid, walls, path: plan_dxf(walls.ends, walls.corners.xy, path).encode(),
+    "plan.svg": lambda grid, walls, path: plan_svg(walls.ends, corner_places(walls), path).encode(),
+    "plan.dxf": lambda grid, walls, path: plan_dxf(walls.ends, corner_places(walls), path).encode(),
     "map.png": map_png,
 }
 """The files of a map by name, and what makes each of grid, walls and the path (T, 2) m of the sensor."""
@@ -30,7 +30,7 @@ MAP_FILES: dict[str, Callable[[OccupancyGrid, Walls, Array], bytes]] = {
 def write_map(
     folder: str | Path,
     grid: OccupancyGrid,
-    walls: Walls,
+    walls: WallTable,
     path: ArrayLike = (),
     texts: Mapping[str, str] | None = None,
 ) -> None:

@@ -10,7 +10,7 @@ from lidarcore.localization.tracking_result import State
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.live.worker import Worker
 from lidarcore.mapping.tracked import Tracked
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.walls import WallTable
 from lidarcore.settings import ExtractionSettings
 
 END_WITHIN = 5.0  # s that a thread may take for what it is at
@@ -32,10 +32,13 @@ class Corrected:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapPicture:
-    """What is known of the building: which cells are occupied and free, and the walls, none before the first search."""
+    """What is known of the building: which cells are occupied and free, and the walls, none before the first search.
+
+    Those of a map that is made now are `Walls`, of which it is known how they err together.
+    """
 
     grid: OccupancyGrid
-    walls: Walls | None = None
+    walls: WallTable | None = None
 
 
 class Background(ABC):
