@@ -15,7 +15,7 @@ from .options import (
     settings_from,
     tell_notes,
 )
-from .progress import counting
+from .progress import ForPrograms, counting
 
 
 def map_recording(
@@ -27,6 +27,7 @@ def map_recording(
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,
+    for_programs: ForPrograms = False,
 ) -> None:
     """A map of where a recording was taken, from whole scans: grid, walls, floor plans, and poses with covariances.
 
@@ -39,7 +40,7 @@ def map_recording(
     check_new_folder(output)
     chosen = settings_from(settings, set_)
     opened = open_recording(recording, topic, chosen.sensor.mask)
-    with counting("scans") as count:
+    with counting("scans", for_programs) as count:
         built = build(opened, chosen, count)
     tell_notes(opened)
     walls = write_files(output, built, chosen)

@@ -19,7 +19,7 @@ ForPrograms = Annotated[
     bool,
     typer.Option(
         "--progress",
-        help=f"for programs: lines '{PROGRESS} DONE TOTAL' on stderr; ends with its standard input",
+        help=f"for programs: lines '{PROGRESS} DONE TOTAL' on stderr, 0 if nobody knows; ends with its standard input",
     ),
 ]
 
@@ -43,11 +43,12 @@ def counted(total: int, for_programs: bool = False) -> Iterator[Callable[[], Non
 
 
 @contextmanager
-def counting(what: str) -> Iterator[Callable[[int], None]]:
+def counting(what: str, for_programs: bool = False) -> Iterator[Callable[[int], None]]:
     """Call what it gives with the number of them so far, where nobody knows how many there will be."""
     from rich.progress import TextColumn, TimeElapsedColumn
 
-    with _bar(None, TextColumn(f"{{task.completed}} {what}"), TimeElapsedColumn()) as tell:
+    bar = _bar(None, TextColumn(f"{{task.completed}} {what}"), TimeElapsedColumn())
+    with _lines(0) if for_programs else bar as tell:
         yield tell
 
 

@@ -138,10 +138,10 @@ class LandmarkStore:
         stored = self.atlas[session].grid()
         return None if stored is None else grid_from_stored(stored)
 
-    def load(self, path: Path, format: str, name: str) -> Session:
+    def load(self, path: Path, format: str, name: str, mode: str = "import") -> Session:
         """A file of a map as a session of its own: landmarks in one of FORMATS, or a "zip" of a grid as ROS has it.
 
-        Walls that are in the zip come along.
+        Walls that are in the zip come along. A map of mode "slam" was built, in a frame of its own.
 
         Raises MapFileError or GridError; nothing is kept of it then.
         So also for a file without landmarks: as the newest map it would be the one that is asked.
@@ -151,7 +151,7 @@ class LandmarkStore:
         if not (building or found):
             raise MapFileError(f"This {format} holds no landmarks: export a map that has some.")
         now = time.time()
-        loaded = self.atlas.begin(name, now, "import", found)
+        loaded = self.atlas.begin(name, now, mode, found)
         if building:
             grid = grid_to_stored(building.grid)
             walls = [] if building.walls is None else to_stored(building.walls)

@@ -39,9 +39,9 @@ class Guard:
     """ASGI middleware: host, origin, token, size of the body, and the headers of every answer."""
 
     def __init__(
-        self, app: ASGIApp, hosts: Collection[str], token: str | None, uploads: str | tuple[str, ...]
+        self, app: ASGIApp, hosts: Collection[str], token: str | None, uploads: tuple[str, ...]
     ) -> None:
-        """Names in `hosts` are ours besides localhost; PUT and POST under `uploads` bound their bodies themselves."""
+        """Names in `hosts` are ours besides localhost; PUT and POST to `uploads` bound their bodies themselves."""
         self._app, self._token, self._uploads = app, token, uploads
         self._hosts = {"localhost", *(host.lower() for host in hosts)}
 
@@ -106,7 +106,10 @@ class Guard:
         return self._token is not None and secrets.compare_digest(given.encode(), self._token.encode())
 
     def _is_upload(self, scope: Scope) -> bool:
-        return scope.get("method") in ("PUT", "POST") and scope["path"].startswith(self._uploads)
+        """Whether the path is one of those for uploads, or below one that ends with a slash."""
+        path: str = scope["path"]
+        is_below = any(path.startswith(known) for known in self._uploads if known.endswith("/"))
+        return scope.get("method") in ("PUT", "POST") and (path in self._uploads or is_below)
 
 
 def _hostname(host: str) -> str:

@@ -20,6 +20,7 @@ from .routes import (
     landmarks,
     localization,
     map,
+    map_making,
     measure,
     meta,
     recorder,
@@ -38,8 +39,8 @@ from .state import ServerOptions, State
 
 API = "/api/v1"
 ROUTES = (
-    frame, measure, localization, walls, grid, landmarks, map, sessions, repeatability, calibration, studies,
-    settings, source, sensor, recordings, recorder, selection, meta,
+    frame, measure, localization, walls, grid, landmarks, map_making, map, sessions, repeatability, calibration,
+    studies, settings, source, sensor, recordings, recorder, selection, meta,
 )  # fmt: skip
 PAGES = {"/": "index.html", "/studies": "studies.html", "/guide": "guide.html", "/docs": "docs.html"}
 _APP = Path(__file__).parents[1]

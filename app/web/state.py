@@ -14,6 +14,7 @@ from lidarcore.errors import LandmarkMapError
 
 from ..jobs.calibration import LiveCalibration
 from ..jobs.landmark_store import LandmarkStore
+from ..jobs.map_maker import MapMaker
 from ..jobs.profiles import Profiles
 from ..jobs.recorder import AsyncRecorder
 from ..jobs.repeatability import LiveRepeatability
@@ -82,6 +83,7 @@ class State:
         self.runtime.frame_listeners += [self.repeatability.observe, self.calibration.observe]
         self.runtime.change_listeners.append(self.calibration.check_source)
         self.studies = Studies(folder / STUDIES)
+        self.map_maker = MapMaker(self.landmarks)
         self.profiles = Profiles(folder / PROFILES)
         self.library = Library(
             options.recordings, options.max_bytes, options.recording, in_use=self._files_in_use
@@ -97,7 +99,7 @@ class State:
     def close(self) -> None:
         """End everything, what produces before what is told of it."""
         self.hub.close()
-        for part in (self.runtime, self._scene, self.studies, self.calibration):
+        for part in (self.runtime, self._scene, self.studies, self.map_maker, self.calibration):
             part.close()
         self.recorder.stop()
         self.library.trash.empty()

@@ -27,7 +27,7 @@ const progressText = el("output", {});
 const message = el("p", { id: "calibration-message", role: "status", hidden: true });
 const progress = el(
   "div",
-  { id: "calibration-progress", hidden: true },
+  { id: "calibration-progress", class: "job", hidden: true },
   bar,
   progressText,
   el("button", { type: "button", class: "button", onclick: cancel }, "Cancel"),

@@ -47,15 +47,15 @@ export function mountMaps() {
       clearButton,
     ),
   );
-  on(["panel", "localization", "mapped"], refresh);
+  on(["panel", "localization", "mapped", "making"], refresh);
   on(["maps", "localization", "landmarks"], draw);
   on(["localization", "settings", "maps"], offer);
 }
 
-let listed = ""; // when the maps were asked for: with which panel open, which map in use, and how many walls in one that grows
+let listed = ""; // when the maps were asked for: with which panel open, which map in use, how many walls in one that grows, and which was made
 
-function refresh(panel, { session, mode }, { walls }) {
-  const wanted = [panel, session, mode, walls.length].join(" ");
+function refresh(panel, { session, mode }, { walls }, making) {
+  const wanted = [panel, session, mode, walls.length, making?.session].join(" ");
   if (panel === "map" && listed !== wanted) list();
   listed = wanted;
 }
@@ -155,7 +155,8 @@ function chooseMap(session) {
   });
 }
 
-async function localizeIn(session) {
+/** Localizes in the map of a session. */
+export async function localizeIn(session) {
   const chosen = await attempt(
     () => request("PUT", "localization/map", { session }),
     "The map could not be chosen",

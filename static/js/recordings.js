@@ -6,6 +6,7 @@ import { $, el, icon, iconButton, remake } from "./dom.js";
 import { attempt, open } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { toast } from "./toasts.js";
+import { makeMap } from "./making.js";
 import { bytes, duration } from "./units.js";
 
 export function mountRecordings() {
@@ -72,7 +73,8 @@ function row(recording, playing, renaming) {
   );
   if (isPlaying) button.setAttribute("aria-current", "true");
   const about = el("p", { class: "about muted" }, aboutOf(recording));
-  return el("li", {}, button, downloadLink(name), ...(builtin ? [] : changeButtons(name, isPlaying)), about);
+  const map = iconButton("map", `Make a map of ${name}`, () => makeMap(name));
+  return el("li", {}, button, map, downloadLink(name), ...(builtin ? [] : changeButtons(name, isPlaying)), about);
 }
 
 const entryText = (name, about) => el("p", { class: "entry" }, el("span", {}, name), el("small", {}, about));

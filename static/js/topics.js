@@ -1,15 +1,15 @@
-// Asks which lidar topic of a recording to play.
+// Asks which lidar topic of a recording is meant.
 
 import { $, el } from "./dom.js";
 
-/** Resolves to the chosen topic, or null if the dialog was dismissed. */
-export function chooseTopic(name, topics) {
+/** Resolves to the chosen topic, or null if the dialog was dismissed; `verb` is what is done with it: play or map. */
+export function chooseTopic(name, topics, verb = "play") {
   const dialog = $("topic-dialog");
   const form = el(
     "form",
     { method: "dialog" },
     el("h2", { id: "topic-title" }, "Several lidars in this recording"),
-    el("p", { class: "muted" }, `${name} holds more than one lidar topic. Choose the one to play.`),
+    el("p", { class: "muted" }, `${name} holds more than one lidar topic. Choose the one to ${verb}.`),
     el(
       "fieldset",
       { class: "choices" },
@@ -20,14 +20,14 @@ export function chooseTopic(name, topics) {
       "div",
       { class: "dialog-buttons" },
       el("button", { class: "button", type: "button", onclick: () => dialog.close("") }, "Cancel"),
-      el("button", { class: "button strong", value: "play" }, "Play this topic"),
+      el("button", { class: "button strong", value: "chosen" }, `${verb[0].toUpperCase()}${verb.slice(1)} this topic`),
     ),
   );
   dialog.replaceChildren(form);
   dialog.returnValue = "";
   dialog.showModal();
   return new Promise((resolve) => {
-    const done = () => resolve(dialog.returnValue === "play" ? new FormData(form).get("topic") : null);
+    const done = () => resolve(dialog.returnValue === "chosen" ? new FormData(form).get("topic") : null);
     dialog.addEventListener("close", done, { once: true });
   });
 }

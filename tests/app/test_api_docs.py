@@ -4,6 +4,7 @@ from typing import Any
 import httpx
 import pytest
 from lidarcore_app.jobs.calibration import CalibrationStatus
+from lidarcore_app.jobs.map_maker import MakingStatus
 from lidarcore_app.jobs.profiles import Profile, ProfileEntry
 from lidarcore_app.jobs.recorder import RecorderStatus
 from lidarcore_app.jobs.studies import StudyStatus
@@ -16,6 +17,7 @@ from lidarcore_app.sources.recording_facts import RecordingFacts
 from lidarcore_app.web.routes.calibration import ProfilesJson
 from lidarcore_app.web.routes.landmarks import LandmarkHistoryJson, LandmarksJson, NeighboursJson
 from lidarcore_app.web.routes.localization import CurrentPoseJson, TrajectoryJson
+from lidarcore_app.web.routes.map_making import MakingJson
 from lidarcore_app.web.routes.measure import MeasureJson
 from lidarcore_app.web.routes.meta import HealthJson, MethodsJson, VersionJson
 from lidarcore_app.web.routes.recordings import RecordingsJson
@@ -65,6 +67,10 @@ TYPES = {
     ("delete", "/sessions/{id}"): None,
     ("get", "/map"): dict,
     ("post", "/map"): Session,
+    ("post", "/map/making"): MakingStatus,
+    ("get", "/map/making"): MakingJson,
+    ("delete", "/map/making"): None,
+    ("get", "/map/making/files"): None,
     ("get", "/source"): SourceStatus,
     ("put", "/source"): SourceStatus,
     ("patch", "/source"): SourceStatus,
@@ -146,6 +152,7 @@ IN_VAIN = {
     ("/selection", 404),
     ("/recorder/start", 409),
     ("/localization/map", 404),
+    ("/map/making", 404),
     ("/pose", 409),
     ("/studies/consistency", 409),
     ("/studies/cwlf", 409),

@@ -28,6 +28,8 @@ MUTATIONS = [
     ("POST", "/localization/reset", None),
     ("PUT", "/localization/map", {"session": None}),
     ("POST", "/map", {"format": "lidarcore landmarks"}),
+    ("POST", "/map/making", {"recording": "room.npz"}),
+    ("DELETE", "/map/making", None),
     ("DELETE", "/landmarks", None),
     ("DELETE", "/sessions/1", None),
     ("DELETE", "/repeatability", None),
@@ -64,7 +66,9 @@ def test_every_mutating_route_is_covered_by_these_tests(shared_server: Server) -
     paths = httpx.get(f"{shared_server.url}/openapi.json").json()["paths"]
     routes = {(m.upper(), path) for path, methods in paths.items() for m in methods if m != "get"}
     names = {f"/api/v1{path}": method for method, path, _ in MUTATIONS}
-    assert len(routes) == len(names) + 2  # PUT and PATCH of /source, POST and DELETE of /calibration
+    assert (
+        len(routes) == len(names) + 3
+    )  # PUT and PATCH of /source, POST and DELETE of /calibration and /map/making
     assert all(
         path.replace("{name}", "new.npz").replace("{id}", "1") in names or "{name}" in path
         for _, path in routes

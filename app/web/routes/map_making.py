@@ -1,0 +1,70 @@
+"""Finished maps of recordings, made beside what plays."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body
+from pydantic import Field
+from starlette.responses import FileResponse
+from typing_extensions import TypedDict
+
+from lidarcore import RecordingError, TopicError
+
+from ...jobs.map_maker import MakingStatus
+from ..problems import documented
+from ..schemas import StrictBody
+from .dependencies import Server
+
+router = APIRouter(prefix="/map/making", tags=["landmarks"])
+
+
+class MakingJson(TypedDict):
+    making: MakingStatus | None
+
+
+ZIP: dict[int | str, dict[str, Any]] = {200: {"description": "The files", "content": {"application/zip": {}}}}
+
+
+class WantedMap(StrictBody):
+    """A recording of the folder, and which lidar if it has several."""
+
+    recording: Annotated[str, Field(max_length=200)]
+    topic: Annotated[str | None, Field(max_length=200)] = None
+
+
+@router.post("", response_description="What is made now", responses=documented(404, 409, 422, 507))
+def start(
+    server: Server, wanted: Annotated[WantedMap, Body(examples=[{"recording": "hall.mcap"}])]
+) -> MakingStatus:
+    """Make a map of a whole recording, as `lidarcore map` does, with the noise, walls and mask that are set now.
+
+    Loops are sought once more and all scans adjusted at once when it is finished, which no map that grows beside the
+    sensor is. It becomes a session, as other maps do. One at a time, in a process of its own that gives way to others.
+    """
+    path = server.library.path(wanted.recording)
+    facts = server.library.facts(wanted.recording)
+    if facts.problem and wanted.topic is None:
+        raise TopicError(facts.problem, facts.topics) if facts.topics else RecordingError(facts.problem)
+    return server.map_maker.start(path, wanted.topic, facts.scans, server.runtime.settings)
+
+
+@router.get("", response_description="What is made, or was made last")
+def read(server: Server) -> MakingJson:
+    """How far the map of a recording is; null if none was made since the server started."""
+    return {"making": server.map_maker.status}
+
+
+@router.delete("", status_code=204, responses=documented(404))
+def cancel(server: Server) -> None:
+    """Make that map no further; nothing of it stays."""
+    server.map_maker.cancel()
+
+
+@router.get(
+    "/files",
+    response_class=FileResponse,
+    responses=ZIP | documented(404),
+)
+def files(server: Server) -> FileResponse:
+    """All files of the map that was made last: what /map gives as zip, and poses.csv with covariances, of all scans."""
+    found = server.map_maker.files
+    return FileResponse(found, media_type="application/zip", filename=found.name)

@@ -1,0 +1,108 @@
+"""Maps of recordings that a real server makes, each in a process of its own, beside what plays."""
+
+import csv
+import io
+from itertools import islice
+from pathlib import Path
+from zipfile import ZipFile
+
+import numpy as np
+import psutil
+from serving import Json, Server, assert_problem, wait_until
+from two_lidars import write_two_lidars
+
+from lidarcore.geometry import pose_difference, relative
+from lidarcore.mapping.export import MAP_FILES
+from lidarcore.recordings.writer import RecordingWriter
+from lidarcore.scan import Array
+from lidarcore.simulation.robot import SimulatedRobot
+from lidarcore.simulation.settings import SimulationSettings
+
+MAKING = "/map/making"
+LONGEST = 240  # s: kernels may have to be compiled first
+
+
+def drive(path: Path, scans: int) -> Array:
+    """A recording of a simulated robot, and where it truly was: (scans, 3), seen from its first scan."""
+    robot = SimulatedRobot(SimulationSettings(world="furnished room", seed=5), begin=1e9)
+    taken = list(islice(robot, scans))
+    with RecordingWriter(path) as writer:
+        for scan in taken:
+            writer.write(scan)
+    truth = np.array([scan.truth for scan in taken])
+    return relative(truth[0], truth)
+
+
+def making(server: Server) -> Json:
+    """What is made, or was made last."""
+    return server.get(MAKING)["making"]
+
+
+def ended(server: Server) -> Json:
+    wait_until(lambda: making(server)["state"] != "running", "it has ended", LONGEST)
+    return making(server)
+
+
+def makers(server: Server) -> list[psutil.Process]:
+    """The processes that make maps of recordings in its folder."""
+    children = psutil.Process().children(recursive=True)
+    return [
+        child
+        for child in children
+        if "map" in child.cmdline() and str(server.folder) in " ".join(child.cmdline())
+    ]
+
+
+def test_a_map_of_a_recording_becomes_a_session_and_files_with_honest_poses(server: Server) -> None:
+    truth = drive(server.folder / "drive.mcap", 100)
+    assert making(server) is None
+    begun = server.change("POST", MAKING, {"recording": "drive.mcap"})
+    assert (begun["recording"], begun["state"], begun["total"]) == ("drive.mcap", "running", 100)
+    again = assert_problem(server.http.post(MAKING, json={"recording": "drive.mcap"}), 409)
+    assert "drive.mcap is being made" in again["detail"]
+    made = ended(server)
+    assert (made["state"], made["error"], made["done"]) == ("finished", None, 100)
+    (session,) = server.get("/sessions")["sessions"]
+    assert (session["id"], session["source"], session["mode"]) == (made["session"], "drive.mcap", "slam")
+    assert session["grid"]
+    assert len(server.get("/walls", session=made["session"])["walls"]) == session["walls"] > 5
+
+    answer = server.http.get(f"{MAKING}/files").raise_for_status()
+    with ZipFile(io.BytesIO(answer.content)) as archive:
+        assert set(archive.namelist()) == {*MAP_FILES, "poses.csv"}
+        rows = list(csv.DictReader(io.StringIO(archive.read("poses.csv").decode())))
+    poses = np.array([[float(row[name]) for name in ("x", "y", "heading")] for row in rows])
+    off = pose_difference(poses, truth)
+    assert np.hypot(off[:, 0], off[:, 1]).max() < 0.05
+    assert np.abs(off[:, 2]).max() < 0.02
+
+
+def test_a_map_that_is_cancelled_is_gone_with_its_process(server: Server) -> None:
+    drive(server.folder / "drive.mcap", 60)
+    server.change("POST", MAKING, {"recording": "drive.mcap"})
+    wait_until(lambda: makers(server), "its process runs")
+    (process,) = makers(server)
+    assert process.nice() == 10
+    folder = Path(next(part for part in process.cmdline() if part.startswith("--output=")).partition("=")[2])
+    assert server.http.delete(MAKING).status_code == 204
+    assert not makers(server)
+    assert making(server)["state"] == "cancelled"
+    assert server.get("/sessions")["sessions"] == []
+    assert_problem(server.http.delete(MAKING), 404)
+    assert "make one first" in assert_problem(server.http.get(f"{MAKING}/files"), 404)["detail"]
+    server.app.state.server.map_maker.close()
+    assert not folder.parent.exists()
+
+
+def test_what_cannot_be_mapped_is_refused_with_the_reason(server: Server) -> None:
+    assert_problem(server.http.post(MAKING, json={"recording": "none.mcap"}), 404)
+    (server.folder / "broken.npz").write_bytes(b"PK\x03\x04 and no more")
+    problem = assert_problem(server.http.post(MAKING, json={"recording": "broken.npz"}), 422)
+    assert "broken.npz" in problem["detail"]
+    assert_problem(server.http.post(MAKING, content=b" " * (1 << 21)), 413)
+    write_two_lidars(server.folder / "two.mcap")
+    problem = assert_problem(server.http.post(MAKING, json={"recording": "two.mcap"}), 409)
+    assert len(problem["topics"]) == 2
+    body = {"recording": "two.mcap", "topic": problem["topics"][0]}
+    assert server.change("POST", MAKING, body)["total"] is None
+    assert ended(server)["recording"] == "two.mcap"
