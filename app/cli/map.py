@@ -1,7 +1,7 @@
 """The command `lidarcore map`."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -24,6 +24,10 @@ def map_recording(
         Path,
         typer.Option("-o", "--output", metavar="FOLDER", help="folder to write the files of the map into"),
     ],
+    odometry: Annotated[
+        Literal["recorded", "none"],
+        typer.Option(help="none leaves out what the recording says of the sensor's motion"),
+    ] = "recorded",
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,
@@ -35,13 +39,13 @@ def map_recording(
     """
     from lidarcore import open_recording
 
-    from .map_run import build, write_files
+    from .map_run import build, without_odometry, write_files
 
     check_new_folder(output)
     chosen = settings_from(settings, set_)
     opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans", for_programs) as count:
-        built = build(opened, chosen, count)
+        built = build(opened if odometry == "recorded" else without_odometry(opened), chosen, count)
     tell_notes(opened)
     walls = write_files(output, built, chosen)
     typer.echo(

@@ -1,7 +1,7 @@
 """A whole recording becomes a map: poses with covariances, and files of them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from lidarcore.mapping import Mapper, MapperSettings
 from lidarcore.mapping.export import write_map
 from lidarcore.mapping.grid import build_grid
 from lidarcore.mapping.walls import Walls, find_walls
-from lidarcore.recordings import Recording
+from lidarcore.scan import Scan
 
 from ..pipeline.settings import Settings
 from ..pipeline.tables import csv_text
@@ -32,10 +32,15 @@ def mapper_settings(settings: Settings) -> MapperSettings:
     return MapperSettings().with_noise(settings.extraction.noise)
 
 
-def build(recording: Recording, settings: Settings, progress: Callable[[int], None]) -> Built:
-    """Map a recording; `progress` is told the number of scans. Raises RecordingError."""
+def without_odometry(scans: Iterable[Scan]) -> Iterator[Scan]:
+    """The scans, without what they say of how the sensor moved."""
+    return (replace(scan, odometry=None) for scan in scans)
+
+
+def build(scans: Iterable[Scan], settings: Settings, progress: Callable[[int], None]) -> Built:
+    """Map the scans of a recording; `progress` is told the number of scans. Raises RecordingError."""
     mapper, states, left_out = Mapper(mapper_settings(settings)), list[str](), list[str]()
-    for number, scan in enumerate(recording, 1):
+    for number, scan in enumerate(scans, 1):
         try:
             states.append("tracking" if mapper.step(scan).connected else "lost")
         except MotionError as error:

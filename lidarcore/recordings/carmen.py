@@ -14,6 +14,10 @@ from lidarcore.recordings.laser_log import LaserLog, Reading, numbers
 from lidarcore.recordings.laser_survey import SICK_RANGE, Survey
 from lidarcore.scan import Array, Scan
 
+_OF_GRAPH = (
+    "The log holds a pose graph (VERTEX lines): the poses of its scans may be those of the graph, not wheel odometry. "
+    "lidarcore map --odometry none leaves them out."
+)
 _NEW = re.compile(r"(ROBOT|RAW)LASER\d")
 _FRONT, _REAR = ("robot_frontlaser_offset", 0.0), ("robot_rearlaser_offset", np.pi)
 OFFSETS = {"FLASER": _FRONT, "RLASER": _REAR} | {
@@ -86,6 +90,8 @@ class CarmenLog(LaserLog):
         elif kind == "NEFF":
             self.is_corrected = True
             self._remark("GMapping wrote the log (NEFF lines): its poses are corrected, not wheel odometry.")
+        elif kind.startswith("VERTEX"):
+            self._remark(_OF_GRAPH)
         return None
 
 

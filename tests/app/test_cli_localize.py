@@ -149,3 +149,23 @@ def test_a_pose_that_is_none_or_of_no_map_is_refused(
     result = run("localize", room, *arguments)
     assert result.returncode == 2
     assert words in result.stderr
+
+
+def test_a_map_may_leave_out_what_the_recording_says_of_the_motion(tmp_path: Path) -> None:
+    """Along a bare wall that goes on beyond the range nothing tells how far one went but the odometry."""
+    path = tmp_path / "wall.mcap"
+    bearings = np.linspace(-1.0, 1.0, 200)
+    with RecordingWriter(path) as writer:
+        for k in range(12):
+            odometry = np.array([0.0, 0.1 * k, 0.0])
+            writer.write(Scan(2 / np.cos(bearings), bearings, 1e9 + k, odometry=odometry))
+    ends = {}
+    for odometry in ("recorded", "none"):
+        done = run("map", path, "-o", tmp_path / odometry, "--odometry", odometry)
+        assert done.returncode == 0, done.stderr
+        ends[odometry] = poses_of(tmp_path / odometry / "poses.csv")[-1]
+    np.testing.assert_allclose(ends["recorded"], [0, 1.1, 0], atol=0.02)
+    np.testing.assert_allclose(ends["none"], [0, 0, 0], atol=0.02)
+    refused = run("map", path, "-o", tmp_path / "x", "--odometry", "wheels")
+    assert refused.returncode == 2
+    assert "'wheels'" in refused.stderr

@@ -173,6 +173,16 @@ def test_a_corrected_sensor_pose_is_not_taken_for_odometry(tmp_path):
     assert any("corrected" in note for note in recording.notes)
 
 
+def test_poses_of_a_graph_are_odometry_that_is_told_of(tmp_path):
+    lines = [robotlaser(stamp=float(k)) for k in range(3)]
+    graph = log(tmp_path, "VERTEX2 0 1.0 2.0 1.5", lines[0], "EDGE2 0 1 0.5 0 0 1 0 1 1 0 0", *lines[1:])
+    scans = list(recording := open_recording(graph))
+    assert [note for note in recording.notes if "pose graph (VERTEX lines)" in note]
+    assert all(scan.odometry is not None and scan.truth is None for scan in scans)
+    plain = open_recording(log(tmp_path, *lines))
+    assert not [note for note in plain.notes if "pose graph" in note]
+
+
 def test_logger_stamps_help_where_the_others_are_rounded(tmp_path):
     lines = [flaser("1.01893e+09", logger=0.2 * index) for index in range(5)]
     assert [scan.stamp for scan in open_recording(log(tmp_path, *lines))] == pytest.approx(0.2 * np.arange(5))
