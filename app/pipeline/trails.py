@@ -16,7 +16,7 @@ KEPT = 100_000  # poses of the trajectory: nearly three hours at 10 Hz
 
 @dataclass(frozen=True, slots=True)
 class TrackedPose:
-    """T_world_sensor as it was estimated at a stamp, s: m, m, rad and their standard deviations."""
+    """T_world_sensor as it was estimated at a stamp, s: m, m, rad, their standard deviations and covariances."""
 
     stamp: float
     x: float
@@ -25,6 +25,9 @@ class TrackedPose:
     sigma_x: float
     sigma_y: float
     sigma_heading: float
+    cov_xy: float
+    cov_x_heading: float
+    cov_y_heading: float
 
 
 class Trail:
@@ -80,8 +83,9 @@ class Trails:
         if tracking.mode == "localize" and tracking.state == "starting":
             return None  # nothing is known of the pose yet
         estimate = tracking.estimate
-        sigma = np.sqrt(np.diag(estimate.covariance))
-        self.trajectory.append(TrackedPose(tracking.stamp, *estimate.pose.tolist(), *sigma.tolist()))
+        C = estimate.covariance
+        errors = [*np.sqrt(np.diag(C)).tolist(), *C[np.triu_indices(3, 1)].tolist()]
+        self.trajectory.append(TrackedPose(tracking.stamp, *estimate.pose.tolist(), *errors))
         self._estimated.add(estimate.pose[:2])
         if tracking.dead_reckoned is not None:
             self._dead_reckoned.add(tracking.dead_reckoned[:2])

@@ -40,7 +40,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True)
 class PastPose:
-    """T_world_sensor as it was estimated at `stamp` (s): m, m, rad and their standard deviations."""
+    """T_world_sensor as it was estimated at `stamp` (s): m, m, rad, their standard deviations and covariances."""
 
     stamp: float
     x: float
@@ -49,6 +49,9 @@ class PastPose:
     sigma_x: float
     sigma_y: float
     sigma_heading: float
+    cov_xy: float
+    cov_x_heading: float
+    cov_y_heading: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -77,8 +77,17 @@ def test_the_trajectory_grows_and_can_be_asked_for_from_a_stamp_on(driving: Serv
         lambda: driving.get("/trajectory", limit=10_000)["poses"][-1]["stamp"] > max(grown, stamps[-1])
     )
     table = driving.http.get("/trajectory", params={"format": "csv", "limit": 5}).text.splitlines()
-    assert table[0] == "stamp,x,y,heading,sigma_x,sigma_y,sigma_heading"
+    assert table[0] == "stamp,x,y,heading,sigma_x,sigma_y,sigma_heading,cov_xy,cov_x_heading,cov_y_heading"
     assert len(table) == 6
+    now = driving.get("/pose")
+    wait_until(lambda: driving.get("/trajectory")["poses"][-1]["stamp"] > now["stamp"])
+    (then,) = [
+        row for row in driving.get("/trajectory", limit=10_000)["poses"] if row["stamp"] == now["stamp"]
+    ]
+    errors = [then[name] for name in ("sigma_x", "sigma_y", "sigma_heading")]
+    C = np.diag(np.square(errors))
+    C[np.triu_indices(3, 1)] = [then[name] for name in ("cov_xy", "cov_x_heading", "cov_y_heading")]
+    np.testing.assert_allclose(np.triu(now["covariance"]), C, rtol=1e-9)
 
 
 def test_a_reset_begins_another_map_at_the_origin(driving: Server) -> None:
