@@ -13,7 +13,7 @@ from lidarcore.geometry import pose_difference, relative, rotation, squared_maha
 from lidarcore.mapping import Mapper, MapperSettings
 from lidarcore.mapping.between import _reduced, kept
 from lidarcore.mapping.graph.recovery import Recovery, factor
-from lidarcore.mapping.graph.refinement import Refined
+from lidarcore.mapping.graph.refinement import UNMEASURED, Refined
 
 SETTINGS = MapperSettings().with_noise(SensorNoise(0.01, 0.001))
 
@@ -106,6 +106,6 @@ def test_what_the_map_keeps_of_errors_is_told_by_keyframes_that_surfaces_tie(joi
     ]
     scatter = np.full((4, 3), 0.1**2 / 2)
     recovery = Recovery(factor(csc_array(np.eye(12))))
-    refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), 1.0, 0.0, recovery)
+    refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), UNMEASURED, recovery)
     found = kept(refined, local, scatter)
     assert found == pytest.approx(1 - (2 / 3 if any(joined) else 1) / 2)

@@ -32,6 +32,9 @@ from lidarcore.mapping.matching.patches import Patches
 
 _FIXED = 1e12  # information of the first pose
 _SETTLED = 0.01  # mean square of a step, in variances of the poses, below which it changes nothing
+_ALIKE = 0.03  # share by which a variance changes, below which it is the same
+_MEASURED = 4  # rounds after which noise is known so well that steps can be compared
+UNMEASURED = Noise(1.0, 0.005**2)
 _LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
 _INNER = float(chdtr(3, _LARGEST) / chdtr(1, _LARGEST))  # times as expected the mean square of the others is
 
@@ -50,19 +53,17 @@ class Step:
 class Refined:
     """Poses (K, 3) with their joint covariance; and what was measured of the surfaces.
 
-    sweeps      (K, 3, 3) covariance that each pose has besides, seen from itself: of where its scan stands
-    speeds      (K, 2, 3) m/s, m/s, rad/s that the sensor moved faster than was taken out of each scan, with variances
-    joined      (K - 1,) whether surfaces tie a keyframe to the next one; else only the step between them does
-    scale       times the patches' own variances, which noise really has
-    unevenness  m, standard deviation that all patches of one view of one place share
+    sweeps  (K, 3, 3) covariance that each pose has besides, seen from itself: of where its scan stands
+    speeds  (K, 2, 3) m/s, m/s, rad/s that the sensor moved faster than was taken out of each scan, with variances
+    joined  (K - 1,) whether surfaces tie a keyframe to the next one; else only the step between them does
+    noise   of the patches, as it was measured
     """
 
     poses: Array
     sweeps: Array
     speeds: Array
     joined: Bools
-    scale: float
-    unevenness: float
+    noise: Noise
     _recovery: Recovery
 
     def covariances(self) -> Array:
@@ -104,6 +105,7 @@ def refine(
     since: list[Array] | None = None,
     assumed: float = 0.0,
     known: Known | None = None,
+    noise: Noise = UNMEASURED,
     rounds: int = 12,
 ) -> Refined:
     """Adjust poses (K, 3) that are right to about a cell's `size` m; the first one stays.
@@ -113,29 +115,39 @@ def refine(
     since are times (N,) s from the mean time of each scan's beams until its patches were seen; None: all at once.
     assumed m is the unevenness that the patches' variances contain: it is measured here, and would count twice.
     known tells which parts of the way may be taken to have seen the same surfaces; None: all.
+    noise is what is known of it before it is measured here.
     steps tie keyframes by what is known where surfaces say nothing: by odometry or the going on of the motion, and by
     what was seen as well between keyframes that `known` does not join.
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
     surfaces = Surfaces(_observations(scans, since, assumed**2), islands, size, known)
-    poses, scale, unevenness, before = poses.copy(), 1.0, 0.005, np.inf
-    for _ in range(rounds):
-        equations = normal_equations(surfaces, poses, Noise(scale, unevenness**2))
+    poses, before = poses.copy(), np.inf
+    for number in range(rounds):
+        equations = normal_equations(surfaces, poses, noise)
         H, g = _with_steps(equations, poses, steps)
         step = factor(H).solve(-g)
         poses = poses + step.reshape(-1, 3)
         poses[:, 2] = wrap(poses[:, 2])
-        scale, unevenness = _measured(equations.groups, len(poses))
+        taken, noise = noise, _measured(equations.groups, len(poses))
         size = float(-g @ step) / len(g)
+        if size < _SETTLED and _is_alike(taken, noise, equations.groups):
+            break
         # Cells are cut anew in each round, which alone moves poses of a large building by some tenths of a deviation.
-        if size < _SETTLED or size >= before:
+        if number >= _MEASURED and size >= before:
             break
         before = size
-    equations = normal_equations(surfaces, poses, Noise(scale, unevenness**2))
+    equations = normal_equations(surfaces, poses, noise)
     recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
-    speeds = speeds_left(surfaces, poses, Noise(scale, unevenness**2))
-    return Refined(poses, sweeps, speeds, _joined(known, len(poses)), scale, unevenness, recovery)
+    speeds = speeds_left(surfaces, poses, noise)
+    return Refined(poses, sweeps, speeds, _joined(known, len(poses)), noise, recovery)
+
+
+def _is_alike(before: Noise, now: Noise, groups: Groups) -> bool:
+    """Whether a group of usual variance has hardly any other noise."""
+    usual = float(np.median(groups.variances)) if len(groups.variances) else 1.0
+    earlier, later = (one.scale * usual + one.unevenness for one in (before, now))
+    return abs(float(np.log(later / earlier))) < _ALIKE
 
 
 def _joined(known: Known | None, keyframes: int) -> Bools:
@@ -179,8 +191,8 @@ def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> 
     return csc_array(H + tied + diags_array(fixed)), g
 
 
-def _measured(groups: Groups, keyframes: int) -> tuple[float, float]:
-    """Factor of the noise's variance, and the standard deviation of what a group shares, from their residuals."""
+def _measured(groups: Groups, keyframes: int) -> Noise:
+    """Factor of the noise's variance, and the variance of what a group shares, from their residuals."""
     kept = (groups.left > 0.2) & (groups.near > 0)  # of the others' noise hardly anything is the ranges'
     squares, noise = groups.squares[kept] / groups.left[kept], groups.variances[kept]
     scale, shared, told = 1.0, 0.005**2, 0.0
@@ -194,7 +206,7 @@ def _measured(groups: Groups, keyframes: int) -> tuple[float, float]:
         rows = np.stack([noise, np.ones(len(noise))], -1)[inner] * weights[:, None]
         (scale, shared), _ = nnls(rows, (squares / _INNER + taken * expected)[inner] * weights)
         scale = max(scale, 0.01)
-    return float(scale), float(np.sqrt(shared))
+    return Noise(float(scale), float(shared))
 
 
 def _told(groups: Groups, expected: Array, told: float, keyframes: int) -> float:
