@@ -34,6 +34,7 @@ export async function makeMap(recording, topic = undefined) {
   try {
     await request("POST", STATUS, { recording, ...(topic && { topic }) });
     await ask();
+    requestAnimationFrame(() => progress.scrollIntoView({ block: "nearest" })); // drawn by then
   } catch (problem) {
     const topics = problem instanceof Problem && problem.members.topics;
     if (!topics?.length) return report(problem, "The map could not be made");

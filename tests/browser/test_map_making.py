@@ -14,6 +14,7 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     page.get_by_role("tab", name="Source").click()
     page.get_by_role("button", name=f"Make a map of {DEMO}").click()
     expect(page.locator("#making-progress output")).to_contain_text(f"Map of {DEMO}")
+    expect(page.locator("#making-progress")).to_be_in_viewport()
     expect(page.locator("#made")).to_contain_text(f"of {DEMO}, made in", timeout=240_000)
     expect(page.locator("#making-progress")).to_be_hidden()
     session = server.get("map/making")["making"]["session"]
