@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..jobs.study_process import PROGRESS
+from ..jobs.command_process import PROGRESS
 
 if TYPE_CHECKING:
     from rich.progress import ProgressColumn

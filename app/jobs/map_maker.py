@@ -14,8 +14,8 @@ from lidarcore import LidarError
 from ..errors import ConflictError, NotFoundError, storing
 from ..pipeline.settings import Settings
 from ..records import record
+from .command_process import CommandProcess
 from .landmark_store import LandmarkStore
-from .study_process import StudyProcess
 
 State = Literal["running", "finished", "failed", "cancelled"]
 
@@ -48,7 +48,7 @@ class _Making:
     error: str | None = None
     started: float = field(default_factory=time.monotonic)
     ended: float | None = None
-    process: StudyProcess | None = None
+    process: CommandProcess | None = None
 
     def status(self) -> MakingStatus:
         elapsed = (self.ended or time.monotonic()) - self.started
@@ -97,7 +97,7 @@ class MapMaker:
                 f"--settings={chosen}",
                 *([f"--topic={topic}"] if topic else []),
             ]
-            made.process = StudyProcess(
+            made.process = CommandProcess(
                 ["map", str(path.absolute()), *wanted], lambda code, message: self._end(made, code, message)
             )
             self._made = made

@@ -13,8 +13,8 @@ from lidarcore import SensorNoise
 
 from ..errors import ConflictError, NotFoundError
 from ..records import record
+from .command_process import CommandProcess
 from .study_kinds import KINDS, Options
-from .study_process import StudyProcess
 from .study_reports import ReportEntry, Reports
 
 State = Literal["running", "finished", "failed", "cancelled"]
@@ -55,7 +55,7 @@ class _Study:
     error: str | None = None
     started: float = field(default_factory=time.monotonic)
     ended: float | None = None
-    process: StudyProcess | None = None
+    process: CommandProcess | None = None
 
     @property
     def elapsed(self) -> float:
@@ -105,7 +105,7 @@ class Studies:
             chosen = _chosen(options, noise)
             run = _Study(kind, chosen, self.reports.new(kind))
             common = [f"--seed={options.seed}", f"--workers={_workers()}", f"--output={run.path}"]
-            run.process = StudyProcess(
+            run.process = CommandProcess(
                 [*KINDS[kind].command, *arguments, *common],
                 lambda code, message: self._end(run, code, message),
             )

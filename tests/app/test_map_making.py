@@ -106,3 +106,7 @@ def test_what_cannot_be_mapped_is_refused_with_the_reason(server: Server) -> Non
     body = {"recording": "two.mcap", "topic": problem["topics"][0]}
     assert server.change("POST", MAKING, body)["total"] is None
     assert ended(server)["recording"] == "two.mcap"
+    server.change("POST", MAKING, body | {"topic": "/none"})
+    made = ended(server)
+    assert (made["state"], made["session"]) == ("failed", None)
+    assert "has no lidar '/none': choose /front or /rear" in made["error"]

@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx
 import psutil
 import pytest
-from lidarcore_app.jobs.study_process import parts_done
+from lidarcore_app.jobs.command_process import parts_done
 from lidarcore_app.jobs.study_reports import MOST
 from processes import ENVIRONMENT, Serving
 from serving import ROOT, Json, Server, assert_problem, write_room

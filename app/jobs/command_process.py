@@ -1,4 +1,4 @@
-"""A study as a process of its own: `lidarcore` at low priority, which ends with this process however that ends."""
+"""A long command in a process of its own: `lidarcore` at low priority, which ends with this one however that ends."""
 
 import os
 import re
@@ -10,14 +10,14 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]  # nothing that lies in the current folder is imported by the study
+ROOT = Path(__file__).parents[2]  # nothing that lies in the current folder is imported by the command
 NICE = 10  # live view comes first
 PROGRESS = "progress"  # what a line of it begins with: progress DONE TOTAL
 KEPT = 40  # lines of what it says, for the message of a failure
 END_WITHIN = 20.0  # s that its processes may take to go once they are killed
 
 
-class StudyProcess:
+class CommandProcess:
     """Runs `lidarcore` with these arguments; `ended` is told, from a thread of its own, its exit code and message."""
 
     def __init__(self, arguments: Sequence[str], ended: Callable[[int, str], None]) -> None:
@@ -25,7 +25,7 @@ class StudyProcess:
         self._output: deque[str] = deque(maxlen=KEPT)
         self._ended = ended
         # Its input is held open by this process alone, and it ends with that: also after a kill -9 of this one.
-        # A session of its own: what a terminal interrupts is this process, which then ends the study.
+        # A session of its own: what a terminal interrupts is this process, which then ends the command.
         self._process = subprocess.Popen(
             [sys.executable, "-m", "lidarcore_app.cli.main", *arguments, "--progress"],
             cwd=ROOT,
@@ -38,7 +38,7 @@ class StudyProcess:
         )
         with suppress(OSError):  # gone already
             os.setpriority(os.PRIO_PROCESS, self._process.pid, NICE)
-        self._reader = threading.Thread(target=self._read, name="study", daemon=True)
+        self._reader = threading.Thread(target=self._read, name="command", daemon=True)
         self._reader.start()
 
     def kill(self) -> None:
@@ -70,7 +70,9 @@ class StudyProcess:
         if self._output:
             return self._output[-1].removeprefix("lidarcore: ")
         return (
-            f"The study was killed by signal {-code}." if code < 0 else f"The study ended with code {code}."
+            f"The process was killed by signal {-code}."
+            if code < 0
+            else f"The process ended with code {code}."
         )
 
 
