@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
+from lidarcore import Scan
 from lidarcore.errors import MotionError
 from lidarcore.mapping import Mapper, MapperSettings
 from lidarcore.mapping.export import write_map
 from lidarcore.mapping.grid import build_grid
 from lidarcore.mapping.walls import Walls, find_walls
-from lidarcore.scan import Scan
 
 from ..pipeline.settings import Settings
 from ..pipeline.tables import csv_text
