@@ -1,4 +1,4 @@
-"""The map that SLAM makes of whole scans, as it is now: the picture of its grid, or all of it as files."""
+"""The map of whole scans that is made, or localized in, now: the picture of its grid, or all of it as files."""
 
 import io
 import tempfile
@@ -59,13 +59,13 @@ async def grid(
         Literal["png", "zip"], Query(description="the grid as a picture, or it and the walls as files")
     ] = "png",
 ) -> Response:
-    """The map that SLAM makes of whole scans, as a picture of its occupancy grid or as files for other programs.
+    """The map of whole scans that SLAM makes, or that the sensor is localized in: its grid as a picture, or all as files.
 
     png: black occupied, white free, grey unknown, y up. Its headers say where it lies: Grid-Resolution is the side of a
     pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
     zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF, the
     picture with its walls; poses are at /trajectory.
-    404 if SLAM makes no map of whole scans, or has no walls yet.
+    404 if there is no such map, or it has no walls.
     """
     found = running_picture(server.runtime).grid
     make = (
