@@ -59,7 +59,7 @@ async def grid(
         Literal["png", "zip"], Query(description="the grid as a picture, or it and the walls as files")
     ] = "png",
 ) -> Response:
-    """The map of whole scans that SLAM makes, or that the sensor is localized in: its grid as a picture, or all as files.
+    """The map of whole scans that SLAM makes, or that is localized in: its grid as a picture, or all of it as files.
 
     png: black occupied, white free, grey unknown, y up. Its headers say where it lies: Grid-Resolution is the side of a
     pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
