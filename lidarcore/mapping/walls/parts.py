@@ -47,8 +47,7 @@ def find_parts(
     """The parts of all groups that still stand, the ones seen most first."""
     parts = [part for group in groups for part in _parts_of(pieces, group, grid, settings)]
     parts.sort(key=lambda part: -len(part.members) * part.length)
-    kept = _without_shadows(parts, settings)
-    return [piece for part in kept for piece in interrupted(pieces, part, kept, settings)]
+    return _interrupted(pieces, _without_shadows(parts, settings), settings)
 
 
 def _parts_of(pieces: Pieces, group: Group, grid: OccupancyGrid, settings: WallSettings) -> Iterator[Part]:
@@ -76,20 +75,30 @@ def members_on(pieces: Pieces, group: Group | Part, low: float, high: float) -> 
     return own if len(own) else group.members
 
 
-def interrupted(pieces: Pieces, part: Part, others: Sequence[Part], settings: WallSettings) -> Iterator[Part]:
-    """A part in pieces, if walls that stand on its line hide it where they stand."""
-    t, beside = part.fit.coordinates(np.array([other.ends for other in others]))
-    turned = np.abs([part.fit.along @ other.fit.normal for other in others]) >= np.sin(settings.corner_angle)
-    feet = t[(np.abs(beside) <= settings.corner_gap) & turned[:, None]]
-    spans = [part.low]
-    for low, high in _holes(pieces, part):
-        if ((feet > low - _FOOT) & (feet < high + _FOOT)).any():
-            spans += [low, high]
-    spans.append(part.high)
-    if len(spans) == 2:
-        yield part
-        return
-    for low, high in np.array(spans).reshape(-1, 2).tolist():
+def _interrupted(pieces: Pieces, parts: Sequence[Part], settings: WallSettings) -> list[Part]:
+    """All parts, in pieces where walls that stand on their lines hide them where they stand."""
+    ends = np.array([part.ends for part in parts]).reshape(-1, 2, 2)
+    normals = np.array([part.fit.normal for part in parts]).reshape(-1, 2)
+    found = list[Part]()
+    for part in parts:
+        t, beside = part.fit.coordinates(ends)
+        turned = np.abs(normals @ part.fit.along) >= np.sin(settings.corner_angle)
+        feet = t[(np.abs(beside) <= settings.corner_gap) & turned[:, None]]
+        cuts = [cut for cut in _holes(pieces, part).tolist() if _stands_in(feet, *cut)]
+        found += _pieces_of(pieces, part, cuts, settings) if cuts else [part]
+    return found
+
+
+def _stands_in(feet: Array, low: float, high: float) -> bool:
+    return bool(((feet > low - _FOOT) & (feet < high + _FOOT)).any())
+
+
+def _pieces_of(
+    pieces: Pieces, part: Part, cuts: Sequence[Sequence[float]], settings: WallSettings
+) -> Iterator[Part]:
+    """What is left of a part beside its cuts, each with a line of its own."""
+    bounds = [part.low, *(bound for cut in cuts for bound in cut), part.high]
+    for low, high in zip(bounds[::2], bounds[1::2], strict=True):
         if high - low >= settings.min_length:
             own = members_on(pieces, part, low, high)
             fit = fit_line(pieces, own)
