@@ -115,35 +115,46 @@ def selected_inverse(begins: Ints, rows: Ints, lower: Array, pivots: Array, orde
 
     A block is NaN if it takes entries of the inverse that L has no place for, because they are 0 there.
     """
-    size = len(pivots)
-    inverse, place, sums = np.empty(len(rows)), np.full(size, -1), np.empty(size)
-    for j in range(size - 1, -1, -1):
-        column = range(begins[j], begins[j + 1])
-        for e in column:
-            place[rows[e]], sums[rows[e]] = e, 0.0
-        met = 0
-        for e in column:
-            k = rows[e]
-            if k == j:
-                continue
-            for f in range(begins[k], begins[k + 1]):
-                i = rows[f]
-                if place[i] >= 0:
+    inverse, place, runs = np.empty(len(rows)), np.full(len(pivots), -1), _alike(begins, rows)
+    for first, end in zip(runs[-2::-1], runs[:0:-1]):  # noqa: B905 (compiled code knows no other)
+        last = rows[begins[end - 1] : begins[end]]
+        others = last[last >= end]
+        m, n = len(others), end - first
+        place[others], place[first:end] = np.arange(m), np.arange(m, m + n)
+        beyond, met = np.empty((m, m)), 0
+        for k in range(m):
+            for e in range(begins[others[k]], begins[others[k] + 1]):
+                if 0 <= place[rows[e]] < m:
                     met += 1
-                    sums[i] += lower[e] * inverse[f]
-                    if i != k:
-                        sums[k] += lower[place[i]] * inverse[f]
-        others = len(column) - 1
-        known = 1.0 if met == others * (others + 1) // 2 else np.nan
-        own = known / pivots[j]
-        for e in column:
-            if rows[e] != j:
-                inverse[e] = -known * sums[rows[e]]
-                own -= lower[e] * inverse[e]
-        inverse[place[j]] = own
-        for e in column:
-            place[rows[e]] = -1
+                    beyond[k, place[rows[e]]] = beyond[place[rows[e]], k] = inverse[e]
+        L = np.zeros((m + n, n))
+        for k in range(n):
+            for e in range(begins[first + k], begins[first + k + 1]):
+                L[place[rows[e]], k] = lower[e]
+        known = 1.0 if met == m * (m + 1) // 2 else np.nan
+        back = np.linalg.inv(L[m:])
+        moved = L[:m] @ back
+        shared = -known * (beyond @ moved)
+        own = back.T @ (back / pivots[first:end].reshape(-1, 1)) - moved.T @ shared
+        for k in range(n):
+            for e in range(begins[first + k], begins[first + k + 1]):
+                at = place[rows[e]]
+                inverse[e] = shared[at, k] if at < m else own[at - m, k]
+        place[last], place[first:end] = -1, -1
     return _blocks(begins, rows, inverse, order)
+
+
+@kernel
+def _alike(begins: Ints, rows: Ints) -> Ints:
+    """Where runs of columns begin that have the same rows below them, and where the last of these ends."""
+    runs, seen = [0], np.full(len(begins) - 1, -1)
+    for j in range(1, len(begins) - 1):
+        seen[rows[begins[j] : begins[j + 1]]] = j
+        before = rows[begins[j - 1] : begins[j]]
+        if len(before) != begins[j + 1] - begins[j] + 1 or (seen[before] == j).sum() != len(before) - 1:
+            runs.append(j)
+    runs.append(len(begins) - 1)
+    return np.array(runs)
 
 
 @kernel

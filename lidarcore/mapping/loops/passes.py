@@ -74,10 +74,8 @@ class Passes:
         """A dozen of the nodes, and the share that each of them saw of what node k sees from a place (3,)."""
         nodes = self._kept(nodes)
         few, poses, sight = nodes[:: max(1, len(nodes) // 12)], self._graph.poses, self._keyframes[k].sight
-        shares = [
-            agreement(self._keyframes[i].sight, sight, relative(poses[i], place), margin)[0] for i in few
-        ]
-        return few, np.array(shares)
+        views = zip(few.tolist(), relative(poses[few], place), strict=True)
+        return few, np.array([agreement(self._keyframes[i].sight, sight, T, margin)[0] for i, T in views])
 
     def is_vague(self, P: Array) -> bool:
         """Whether a pose with covariance P (3, 3) is known too little for its tie to be believed alone."""
@@ -96,8 +94,10 @@ class Passes:
     def seen(self, around: int, nodes: Ints) -> Patches:
         """What nodes saw together, seen from one of them."""
         kept = self._kept(nodes)
+        several = [self._keyframes[node].patches for node in kept.tolist()]
         poses = relative(self._graph.poses[around], self._graph.poses[kept])
-        return joined([placed(self._keyframes[n].patches.near, x) for n, x in zip(kept, poses, strict=True)])
+        each = np.repeat(poses, [len(seen.means) for seen in several], axis=0)
+        return placed(joined(several), each).near
 
     def _kept(self, nodes: Ints) -> Ints:
         """Those of the nodes whose scans are still there."""

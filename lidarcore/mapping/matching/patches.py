@@ -68,8 +68,8 @@ def patches(scan: Scan, settings: MatchSettings) -> Patches:
 
 
 def placed(seen: Patches, pose: Array) -> Patches:
-    """Patches of a sensor at a pose (3,), in the frame of the pose."""
-    return seen._replace(means=act(pose, seen.means), normals=rotate(pose[2], seen.normals))
+    """Patches of a sensor at a pose (3,), or each at a pose of its own (N, 3), in the frame of the poses."""
+    return seen._replace(means=act(pose, seen.means), normals=rotate(pose[..., 2], seen.normals))
 
 
 def joined(several: Sequence[Patches]) -> Patches:
