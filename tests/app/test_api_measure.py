@@ -66,6 +66,26 @@ def test_corners_and_walls_of_the_map_are_as_far_from_each_other_as_in_the_room(
     assert found["angle"] == pytest.approx(0, abs=6 * found["angle_sigma"])
 
 
+def test_walls_of_the_map_are_named_by_their_ids(mapped: Server) -> None:
+    walls = {wall["id"]: wall for wall in mapped.get("/walls")["walls"]}
+    by_place = mapped.get("/measure", first=at("map-wall", MIDDLES[0]), second=at("map-wall", MIDDLES[2]))
+    first, second = by_place["first"]["id"], by_place["second"]["id"]
+    by_id = mapped.get("/measure", first=f"map-wall:{first}", second=f"map-wall:{second}")
+    assert by_id["distance"] == pytest.approx(by_place["distance"])
+    assert by_id["sigma"] == pytest.approx(by_place["sigma"])
+    assert by_id["first"]["id"] == first
+    assert by_id["first"]["at"] == pytest.approx(
+        np.mean([walls[first]["start"], walls[first]["end"]], axis=0)
+    )
+    params = {"first": f"map-wall:{first}", "second": at("map-corner", CORNERS[2])}
+    assert mapped.get("/measure", **params)["distance"] == pytest.approx(4, abs=0.1)
+    gone = assert_problem(mapped.http.get("/measure", params=params | {"first": "map-wall:99999"}), 404)
+    assert "no wall 99999 now: take an id that /walls gives" in gone["detail"]
+    for none in ("map-wall:-1", "map-wall:x", "wall:1", "map-corner:1"):
+        problem = assert_problem(mapped.http.get("/measure", params=params | {"first": none}), 422)
+        assert "map-wall:ID" in problem["detail"]
+
+
 def test_scan_and_map_are_not_mixed_and_without_a_map_nothing_of_it_is_measured(mapped: Server, room) -> None:
     corner, other = CORNERS[0], CORNERS[2]
     for first, second, status in (

@@ -32,13 +32,14 @@ NO_WALLS = (
 
 _Candidates = tuple[list[Feature], list[int], Array]  # each with its id, and its place (N, 2) m that is meant
 
-_PLACE = r"^(map-)?(corner|wall)@-?\d{1,6}(\.\d{1,12})?,-?\d{1,6}(\.\d{1,12})?$"
+_PLACE = r"^((map-)?(corner|wall)@-?\d{1,6}(\.\d{1,12})?,-?\d{1,6}(\.\d{1,12})?|map-wall:\d{1,18})$"
 
 
 def _place(text: str) -> str:
     if not re.search(_PLACE, text):
         raise ValueError(
-            f"{text!r} is no place: write corner@x,y, wall@x,y, map-corner@x,y or map-wall@x,y, x and y in metres"
+            f"{text!r} is no place: write corner@x,y, wall@x,y, map-corner@x,y or map-wall@x,y, x and y in metres, or "
+            "map-wall:ID, the id as /walls gives it"
         )
     return text
 
@@ -49,8 +50,9 @@ Place = Annotated[
     Query(
         json_schema_extra={"pattern": _PLACE},
         description="corner@x,y or wall@x,y: the nearest of the scan to a place, m, in the frame of the map or of the "
-        "sensor; map-corner@x,y or map-wall@x,y: of the map of whole scans",
-        examples=["corner@3.1,1.99"],
+        "sensor; map-corner@x,y or map-wall@x,y: of the map of whole scans; map-wall:ID: its wall with that id, as "
+        "/walls gives it",
+        examples=["corner@3.1,1.99", "map-wall:7"],
     ),
 ]
 
@@ -60,7 +62,8 @@ Kind = Literal["corner", "wall", "map-corner", "map-wall"]
 
 class MeasuredFeatureJson(TypedDict):
     """`id` of a corner as frames have it, of a wall its number in this frame, of a wall of the map its id; `at`, the
-    place on it, m. Corners of the map have no ids that last: theirs is the number among them now.
+    place on it, m, of a wall that was named by its id its middle. Corners of the map have no ids that last: theirs is
+    the number among them now.
     """
 
     kind: Kind
@@ -89,12 +92,13 @@ def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
     """How far two corners or walls of the current frame, or of its map, are from each other, and how sure that is.
 
     From a corner to a wall: across its line; between walls: across, on the average, which says nothing of walls that
-    are not about parallel: their `angle` tells. 404 if nothing is near a place, or both places name the same thing;
-    422 if one is of the scan and the other of the map, which err together in ways that nobody knows.
+    are not about parallel: their `angle` tells. 404 if nothing is near a place, no wall has the id, or both
+    places name the same thing; 422 if one is of the scan and the other of the map, which err together in ways that
+    nobody knows.
     """
     if first.startswith("map-") != second.startswith("map-"):
         raise ProblemError(422, MIXED)
-    a, b = (_nearest(frame, place) for place in (first, second))
+    a, b = (_found(frame, place) for place in (first, second))
     if a.feature == b.feature:
         raise NotFoundError("Both places are on the same wall or corner: give places on two different ones.")
     walls = a.feature.kind == b.feature.kind == "wall"
@@ -114,8 +118,25 @@ def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
     }
 
 
-def _nearest(frame: Frame, place: str) -> _Found:
+def _found(frame: Frame, place: str) -> _Found:
     """The corner or wall that a place means. Raises NotFoundError."""
+    _, _, id = place.partition(":")
+    return _wall(_map(frame), int(id)) if id else _nearest(frame, place)
+
+
+def _wall(walls: Walls, id: int) -> _Found:
+    """The wall with an id. Raises NotFoundError."""
+    where = np.flatnonzero(walls.ids == id)
+    if not len(where):
+        raise NotFoundError(
+            f"The map has no wall {id} now: take an id that /walls gives. Walls that become one keep the oldest id."
+        )
+    x, y = walls.ends[where[0]].mean(0).tolist()
+    return _Found(Feature("wall", id), {"kind": "map-wall", "id": id, "at": (x, y)})
+
+
+def _nearest(frame: Frame, place: str) -> _Found:
+    """The corner or wall nearest to a place. Raises NotFoundError."""
     kind, _, xy = place.partition("@")
     at = np.array([float(value) for value in xy.split(",")])
     features, ids, spots = _of_map(frame, kind, at) if kind.startswith("map-") else _of_scan(frame, kind, at)
