@@ -11,6 +11,7 @@ from .options import (
     SettingsFile,
     Topic,
     check_folder,
+    check_output,
     numbers,
     plural,
     settings_from,
@@ -82,15 +83,14 @@ def localize(
 
 
 def _check(output: Path | None, known: Path | None, save_map: Path | None, pose: str | None) -> None:
-    """Raises BadParameter or RecordingError if options do not go together, or a file cannot be written at the end."""
+    """Raises BadParameter, LidarError or OSError if options do not go together, or a file could not be written."""
     from .localization_run import format_of
 
     if known is not None and save_map is not None:
         raise typer.BadParameter("give --map or --save-map: a known map stays as it is.")
     if pose is not None and known is None:
         raise typer.BadParameter("give --pose with --map: SLAM begins where the first scan was taken.")
-    if output is not None:
-        check_folder(output)
+    check_output(output, ".csv")
     if save_map is not None:
         format_of(save_map)
         check_folder(save_map, "--save-map")

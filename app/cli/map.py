@@ -11,6 +11,7 @@ from .options import (
     SettingsFile,
     Topic,
     check_new_folder,
+    named_folder,
     plural,
     settings_from,
     tell_notes,
@@ -22,7 +23,13 @@ def map_recording(
     recording: RecordingPath,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", metavar="FOLDER", help="folder to write the files of the map into"),
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FOLDER",
+            parser=named_folder,
+            help="folder to write the files of the map into",
+        ),
     ],
     odometry: Annotated[
         Literal["recorded", "none"],

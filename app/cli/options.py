@@ -67,6 +67,13 @@ def check_folder(file: Path, option: str = "--output") -> None:
     _check_writable(file.absolute().parent, file, option)
 
 
+def named_folder(name: str) -> Path:
+    """Raises BadParameter if the name is empty, as of a variable that is not set: that were the working folder."""
+    if not name.strip():
+        raise typer.BadParameter("the name of the folder is empty: give one, or . for the working folder.")
+    return Path(name)
+
+
 def check_new_folder(folder: Path) -> None:
     """As `check_folder`, for a folder that may have to be made."""
     there = next(path for path in (folder, *folder.absolute().parents) if path.exists())

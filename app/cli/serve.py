@@ -32,7 +32,7 @@ Maps = Annotated[
     str | None,
     typer.Option(
         "--map",
-        metavar="URL",
+        metavar="FILE",
         help="file of landmark maps; landmarks.db beside the folder of recordings if not given",
     ),
 ]

@@ -93,9 +93,11 @@ def _write_csv(rows: Iterable[Row], file: TextIO) -> None:
 
 def _read_csv(file: TextIO) -> Iterator[Row]:
     reader = csv.reader(_lines(file), strict=True)
-    header = next(reader, [])
+    header = next(filter(None, reader), None)
+    if header is None:
+        raise MapFileError("This CSV of landmarks is empty: export the map again, or give another file.")
     names = {csv_name: name for name, csv_name in _CSV_NAMES.items()}
-    if unknown := [name for name in header or [""] if name not in names]:
+    if unknown := [name for name in header if name not in names]:
         raise MapFileError(f"Columns {unknown} are unknown: rename and convert them to {list(names)}.")
     for values in filter(None, reader):  # without blank lines
         if len(values) != len(header):

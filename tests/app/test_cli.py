@@ -33,6 +33,10 @@ def test_help_is_instant_and_names_every_command() -> None:
         assert run(command, "--help").returncode == 0
 
 
+def test_the_file_of_maps_is_said_to_be_a_file() -> None:
+    assert re.search(r"--map +FILE ", run("serve", "--help").stdout)
+
+
 def test_info_says_what_is_in_a_recording(hokuyo: Path) -> None:
     result = run("info", hokuyo)
     assert result.returncode == 0, result.stderr

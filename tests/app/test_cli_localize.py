@@ -120,6 +120,26 @@ def test_a_map_of_ranges_in_millimetres_says_to_check_the_unit(tmp_path: Path) -
     assert not (tmp_path / "map").exists()
 
 
+def test_poses_are_written_as_csv_only(tmp_path: Path) -> None:
+    refused = run("localize", "no-recording.npz", "-o", tmp_path / "poses.txt")
+    assert_refused(refused, "poses.txt should end in .csv")
+
+
+def test_a_map_goes_into_a_folder_with_a_name(tmp_path: Path) -> None:
+    """The recording is not even opened."""
+    refused = run("map", "no-recording.npz", "-o", "")
+    assert refused.returncode == 2
+    assert "the name of the folder is empty" in refused.stderr
+
+
+@pytest.mark.parametrize("text", ["", "\n\n"])
+def test_an_empty_map_is_said_to_be_empty(room: Path, tmp_path: Path, text: str) -> None:
+    (tmp_path / "map.csv").write_text(text)
+    assert_refused(
+        run("localize", room, "--map", tmp_path / "map.csv"), "This CSV of landmarks is empty: export"
+    )
+
+
 @pytest.fixture
 def room(tmp_path: Path) -> Path:
     """A recording of a sensor that stands, with the grid of what it sees beside it."""

@@ -110,6 +110,12 @@ def test_what_is_no_deviation_of_the_reference_is_refused(drive: Path, own: str)
     assert "two numbers" in result.output
 
 
+def test_odometry_that_there_is_not_is_refused_before_anything_is_read() -> None:
+    result = CliRunner().invoke(cli, ["evaluate", "map", "no-recording.npz", "--odometry", "nope"])
+    assert result.exit_code == 2
+    assert "'nope'" in result.output
+
+
 def test_settings_are_not_taken_for_simulated_rooms_that_do_not_use_them() -> None:
     result = CliRunner().invoke(cli, ["evaluate", "walls", "--seeds", "1", "--set", "gap=0.3"])
     assert result.exit_code == 2

@@ -112,7 +112,7 @@ def as_geojson(geometry, **changes):
         ("geojson", as_geojson({"type": "Point", "coordinates": "12"}), "Landmark 2 is no Point"),
         ("geojson", as_geojson(POINT, x=7), "Landmark 2 has x among its properties"),
         ("json", as_json(last_seen=1e300), "Landmark 2: .*give seconds"),
-        ("csv", "", "Columns"),
+        ("csv", "", "This CSV of landmarks is empty: export"),
         ("csv", CSV_HEAD.replace("x_m,", "x_mm,", 1) + "\n1,2,1,0,1,corner\n", "x_mm"),
         ("csv", f"{CSV_HEAD}\n1,2,1,0,1,corner\n1,2,1,0,corner\n", "Line 3 has 5 values, the header 6"),
         ("csv", f"{CSV_HEAD}\n1,2,1,0,1,corner,7\n", "Line 2 has 7 values, the header 6"),

@@ -2,7 +2,7 @@
 
 from math import degrees, inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -22,7 +22,7 @@ _AT_A_SCAN = 0.0005
 def evaluate_map(
     recording: RecordingPath,
     odometry: Annotated[
-        str,
+        Literal["auto", "recorded", "poor", "none"],
         typer.Option(
             help="recorded, poor (3 % scale, 1 % a metre turn bias, noise), none; auto is what the recording allows"
         ),
