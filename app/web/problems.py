@@ -98,12 +98,19 @@ def install(app: FastAPI) -> None:
 
     handle(ProblemError, lambda error: error)
     handle(HTTPException, lambda e: ProblemError(e.status_code, str(e.detail), dict(e.headers or {})))
+    app.add_exception_handler(404, _not_found)
     app.add_exception_handler(405, _not_allowed)
     handle(RequestValidationError, _invalid)
     handle(ValidationError, _invalid)
     handle(LidarError, _problem)
     handle(ClientDisconnect, lambda e: ProblemError(400, "The connection broke off before all was sent."))
     handle(Exception, lambda e: ProblemError(500, "The server failed to answer this; see its log."))
+
+
+async def _not_found(request: Request, error: Exception) -> Response:
+    """404 of a path that no route has; what a route does not find it says itself."""
+    detail = f"There is nothing at {request.url.path}: /docs shows what the API has, and / is the page."
+    return ProblemError(404, detail).response(request.url.path)
 
 
 async def _not_allowed(request: Request, error: Exception) -> Response:

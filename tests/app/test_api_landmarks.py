@@ -190,7 +190,7 @@ def test_a_landmark_tells_its_history_also_when_it_was_removed(maps: Maps) -> No
     [
         ("", {"bbox": "1,0,0,1"}, "no minimum above its maximum"),
         ("", {"bbox": "0,1,1,0"}, "no minimum above its maximum"),
-        ("", {"bbox": "nan,0,1,1"}, "'nan,0,1,1'"),
+        ("", {"bbox": "nan,0,1,1"}, "'nan,0,1,1': nan is no number"),
         ("", {"bbox": "0,0,1"}, "min_x,min_y,max_x,max_y"),
         ("", {"bbox": "a,b,c,d"}, "min_x,min_y,max_x,max_y"),
         ("", {"x": 1, "y": 1}, "radius"),

@@ -83,6 +83,8 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
     assert 2 <= len(around) <= len(table)
     assert driving.http.get("/walls", params={"bbox": "90,90,99,99"}).json() == {"walls": []}
     assert_problem(driving.http.get("/walls", params={"min_length": 3, "max_length": 2}), 422)
+    alone = assert_problem(driving.http.get("/walls", params={"tolerance": 0.2}), 422)
+    assert "give direction, too" in alone["detail"]
 
     answer = driving.http.get("/map/grid", params={"format": "zip"})
     with ZipFile(io.BytesIO(answer.content)) as archive:

@@ -104,6 +104,12 @@ def test_allow_names_every_method_of_the_path(shared_server: Server) -> None:
     assert answer.headers["Allow"] == "GET, PATCH, PUT"
 
 
+@pytest.mark.parametrize("path", ["/api", "/api/", "/api/v1", "/api/v1/scan", "/static/nothing.js"])
+def test_where_there_is_nothing_it_says_where_there_is_something(shared_server: Server, path: str) -> None:
+    problem = assert_problem(shared_server.http.get(shared_server.url + path), 404)
+    assert problem["detail"].startswith(f"There is nothing at {path}: /docs shows")
+
+
 def test_every_route_with_a_body_says_that_it_may_be_no_json(shared_server: Server) -> None:
     paths = shared_server.http.get(f"{shared_server.url}/openapi.json").json()["paths"]
     bodies = [

@@ -92,6 +92,10 @@ async def _region(
         x_min, y_min, x_max, y_max = map(float, bbox.split(","))
     except ValueError as error:
         raise ProblemError(422, f"bbox is {bbox!r}: give min_x,min_y,max_x,max_y in metres.") from error
+    if any(map(math.isnan, (x_min, y_min, x_max, y_max))):
+        raise ProblemError(
+            422, f"bbox is {bbox!r}: nan is no number; give min_x,min_y,max_x,max_y in metres."
+        )
     if not (x_min <= x_max and y_min <= y_max):
         raise ProblemError(
             422, f"bbox is {bbox!r}: give min_x,min_y,max_x,max_y, no minimum above its maximum."

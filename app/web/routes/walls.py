@@ -33,6 +33,8 @@ router = APIRouter(tags=["localization"], responses=documented(404, 422))
 
 NO_SESSION = "No map is kept yet: wait for further scans, or give the session of one that is kept."
 
+TOLERANCE = 0.1  # rad that a direction may be off, if nobody says
+
 CSV = "id,alpha_rad,r_m,x1_m,y1_m,x2_m,y2_m,length_m,..."
 
 
@@ -65,17 +67,26 @@ async def _wanted(
     direction: Annotated[
         float | None, Query(ge=-7, le=7, description="rad from the x axis; a wall runs both ways")
     ] = None,
-    tolerance: Annotated[float, Query(ge=0, le=1.6, description="rad that the direction may be off")] = 0.1,
+    tolerance: Annotated[
+        float | None,
+        Query(ge=0, le=1.6, description=f"rad that the direction may be off; {TOLERANCE} if not given"),
+    ] = None,
 ) -> Callable[[WallTable], Mask]:
-    """Which walls count. Raises ProblemError 422 if the lengths are exchanged."""
+    """Which walls count. Raises ProblemError 422 if the lengths are exchanged, or tolerance is that of no direction."""
     if min_length > max_length:
         raise ProblemError(
             422, f"min_length ({min_length:g} m) is above max_length ({max_length:g} m): swap them."
         )
+    if direction is None and tolerance is not None:
+        raise ProblemError(
+            422, "tolerance says how far a direction may be off: give direction, too, or leave it out."
+        )
+
+    off = TOLERANCE if tolerance is None else tolerance
 
     def which(walls: WallTable) -> Mask:
         kept: Mask = (walls.length >= min_length) & (walls.length <= max_length)
-        return kept if direction is None else kept & along(walls, direction, tolerance)
+        return kept if direction is None else kept & along(walls, direction, off)
 
     return which
 
