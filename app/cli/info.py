@@ -29,7 +29,7 @@ def summarise(recording: Recording) -> Iterator[tuple[str, str]]:
     yield "scans", str(len(beams))
     yield "duration", _duration(np.frombuffer(stamps))
     yield "beams per scan", f"{min(beams)} to {max(beams)}, median {np.median(beams):.0f}"
-    yield "bearings", f"{np.degrees(first):.1f} to {np.degrees(last):.1f} degrees"
+    yield "bearings", _sector(first, last)
     yield "returns", f"{100 * valid / sum(beams):.1f} %"
     yield "ranges", f"{shortest:.3f} to {longest:.3f} m" if valid else "none"
     yield "odometry", f"in {odometry} scans" if odometry else "none"
@@ -39,6 +39,12 @@ def summarise(recording: Recording) -> Iterator[tuple[str, str]]:
         x, y, yaw = recording.T_base_sensor
         yield "sensor on the robot", f"x {x:.3f} m, y {y:.3f} m, yaw {np.degrees(yaw):.1f} degrees"
     yield from (("note", note) for note in recording.notes)
+
+
+def _sector(first: float, last: float) -> str:
+    """From where to where, rad; from 0 on if all of it is below, as a sensor that turns clockwise has it."""
+    turned = 360 if first < -np.pi and last <= 0 else 0
+    return f"{np.degrees(first) + turned:z.1f} to {np.degrees(last) + turned:z.1f} degrees"
 
 
 def _duration(stamps: Array) -> str:

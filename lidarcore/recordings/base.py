@@ -88,7 +88,7 @@ class Recording(ABC):
     @property
     def notes(self) -> tuple[str, ...]:
         """Plain sentences on what was found and handled; the counts in them grow during an iteration."""
-        return (*self._remarks, *(f"{count} {what}." for what, count in self._counts.items()))
+        return (*self._remarks, *(_counted(what, count) for what, count in self._counts.items()))
 
     def __iter__(self) -> Iterator[Scan]:
         self._counts.clear()
@@ -126,6 +126,7 @@ class Recording(ABC):
         self._remarks[sentence] = None
 
     def _count(self, what: str, number: int) -> None:
+        """Count so many of what is named in the plural: "damaged lines left out"."""
         if number:
             is_counted = what in self._counts or len(self._counts) < MOST_NOTES
             self._counts[what if is_counted else "other oddities"] += number
@@ -164,3 +165,10 @@ class Recording(ABC):
         except Exception as error:
             reason = f"{type(error).__name__}: {error}".rstrip(": ")
             raise self._error(f"cannot be read as {self.name} ({reason}).") from error
+
+
+def _counted(what: str, number: int) -> str:
+    """'2 damaged lines left out.', '1 damaged line left out.': the first plural is that of what was counted."""
+    if number == 1:
+        what = re.sub(r"(ie)?(?<!s)s\b", lambda ending: "y" if ending[1] else "", what, count=1)
+    return f"{number} {what}."

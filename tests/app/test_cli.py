@@ -52,6 +52,20 @@ def test_info_says_what_is_in_a_recording(hokuyo: Path) -> None:
         assert re.search(line, result.stdout), (line, result.stdout)
 
 
+@pytest.mark.parametrize(
+    ("degrees", "told"),
+    [
+        (-np.arange(360.0), "1.0 to 360.0"),
+        (-np.arange(90.0), "-89.0 to 0.0"),
+        (np.arange(-185.0, 175.0), "-185.0 to 174.0"),
+    ],
+)
+def test_bearings_are_told_as_people_count_them(degrees: np.ndarray, told: str, tmp_path: Path) -> None:
+    """Also of a sensor that turns clockwise."""
+    np.savez(tmp_path / "room.npz", ranges=np.full((2, len(degrees)), 2.0), bearings=np.radians(degrees))
+    assert re.search(rf"bearings +{told} degrees", run("info", tmp_path / "room.npz").stdout)
+
+
 @pytest.fixture(scope="module")
 def tables(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The same recording processed into every format, by two methods."""

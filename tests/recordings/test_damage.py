@@ -191,7 +191,7 @@ def test_a_damaged_chunk_costs_only_itself(samples, tmp_path):
     (tmp_path / "flip.mcap").write_bytes(content)
     scans, notes = read(tmp_path / "flip.mcap")
     assert 250 < len(scans) < 300
-    assert "1 damaged chunks, whose rest is left out." in notes
+    assert "1 damaged chunk, whose rest is left out." in notes
 
 
 def test_an_old_laser_line_cut_anywhere_is_never_half_read(samples, tmp_path):

@@ -178,7 +178,7 @@ HOSTILE = {
         "unpacks to more than",
     ),
     "deep.json": (lambda: b'{"dev1": [[1, ' + b"[" * 10**6, "cannot be read as JSON"),
-    "many_beams.log": (lambda: CARMEN_HEAD + b"FLASER 4000000000 1 2 3\n", "1 damaged lines left out"),
+    "many_beams.log": (lambda: CARMEN_HEAD + b"FLASER 4000000000 1 2 3\n", "1 damaged line left out"),
 }
 
 

@@ -71,7 +71,7 @@ def test_a_clockwise_scan_is_turned(written):
         assert quality == range_
         assert time == pytest.approx(0.01 * index)
     assert (np.diff(scan.bearings) > 0).all()
-    assert "1 scans that ran clockwise, turned." in recording.notes
+    assert "1 scan that ran clockwise, turned." in recording.notes
 
 
 def test_a_sensor_upside_down_is_mirrored(written):
@@ -137,7 +137,7 @@ def test_markers_for_no_return_are_missing(written):
 )
 def test_angles_that_make_no_sense_are_refused(written, fields):
     path = written([("/scan", LASER, laser(1, np.ones(361), **fields), 1.0)])
-    with pytest.raises(RecordingError, match=r"no readable scan.*1 damaged scans left out"):
+    with pytest.raises(RecordingError, match=r"no readable scan.*1 damaged scan left out"):
         list(open_recording(path))
 
 

@@ -38,7 +38,7 @@ def test_csv_revolutions_are_those_of_the_flags(data, name, revolutions):
     recording = open_recording(data / ROOMS / f"{name}.csv.gz")
     scans = list(recording)
     assert len(scans) == revolutions - 1
-    assert "1 partial revolutions at the start or end left out." in recording.notes
+    assert "1 partial revolution at the start or end left out." in recording.notes
     for scan, part in zip(scans, parts[1:], strict=True):
         quality = part["quality"] if "quality" in part.dtype.names else None
         assert (scan.quality is None) == (quality is None)

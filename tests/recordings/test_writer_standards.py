@@ -253,7 +253,7 @@ def test_bearings_are_even_where_the_beams_do_not_fit_the_scan(tmp_path):
     (read,) = recording
     assert len(read) == 90
     np.testing.assert_allclose(read.bearings, scan.bearings[:90], atol=1e-5)
-    assert recording.notes == ("1 scans whose exact bearings are lost: even steps taken.",)
+    assert recording.notes == ("1 scan whose exact bearings are lost: even steps taken.",)
 
 
 def test_a_recording_mounted_upside_down_is_mirrored_with_its_gaps(tmp_path):
