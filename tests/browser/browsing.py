@@ -29,7 +29,6 @@ FLAGS = [
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
 ]  # fmt: skip
-WASM_BINDING = "unsafe-eval"  # viser's client tries once at its start, is refused, and does without
 PIXEL_OF = """async ([kind, id]) => {
   const [{ lookNow }, { worldOf }, { get }] = await Promise.all(
     ["scene.js", "overlay/world.js", "store.js"].map((name) => import(`/static/js/${name}`)));
@@ -147,7 +146,7 @@ class Visitor:
         self.page, self.server = page, server
         self.asked: list[str] = []
         self.errors: list[str] = []
-        self.tolerated = [WASM_BINDING]
+        self.tolerated: list[str] = []
         page.on("request", lambda request: self.asked.append(request.url))
         page.on("websocket", lambda websocket: self.asked.append(websocket.url))
         page.on("pageerror", lambda error: self.errors.append(str(error)))
