@@ -138,7 +138,7 @@ class LandmarkStore:
         stored = self.atlas[session].grid()
         return None if stored is None else grid_from_stored(stored)
 
-    def load(self, path: Path, format: str, name: str, mode: str = "import") -> Session:
+    def load(self, path: Path, format: str, source: str, mode: str = "import", name: str = "") -> Session:
         """A file of a map as a session of its own: landmarks in one of FORMATS, or a "zip" of a grid as ROS has it.
 
         Walls that are in the zip come along. A map of mode "slam" was built, in a frame of its own.
@@ -151,7 +151,7 @@ class LandmarkStore:
         if not (building or found):
             raise MapFileError(f"This {format} holds no landmarks: export a map that has some.")
         now = time.time()
-        loaded = self.atlas.begin(name, now, mode, found)
+        loaded = self.atlas.begin(source, now, mode, found, name)
         if building:
             grid = grid_to_stored(building.grid)
             walls = [] if building.walls is None else to_stored(building.walls)
@@ -172,7 +172,10 @@ class LandmarkStore:
         return self.atlas.newest_to_localize_in()
 
     def _replace_earlier(self, run: SessionWriter) -> None:
-        """Give up the maps of earlier runs with the same `replay` that saw no more of it, unless they are in use."""
+        """Give up the maps of earlier runs with the same `replay` that saw no more of it.
+
+        Those that are in use are kept, and those that somebody has named.
+        """
         if run.replay is None or run.session is None:
             return
         try:
@@ -186,7 +189,8 @@ class LandmarkStore:
             if earlier < run.session and earlier != self._used:
                 del finished[earlier]
                 with suppress(UnknownSessionError):
-                    self.atlas.delete(earlier)
+                    if not self.atlas.session(earlier).name:
+                        self.atlas.delete(earlier)
 
     def _tell(self, change: MapChange) -> None:
         for listener in self.listeners:

@@ -10,6 +10,7 @@ from typing import Literal
 from zipfile import ZIP_DEFLATED, ZipFile
 
 from lidarcore import LidarError
+from lidarcore.landmarks import MAX_NAME
 
 from ..errors import ConflictError, NotFoundError, storing
 from ..pipeline.settings import Settings
@@ -140,12 +141,19 @@ class MapMaker:
         """The session that a map has become, or why it has not."""
         try:
             packed = _packed(made)
-            session = self._store.load(packed, "zip", made.recording, mode="slam").id
+            named = _name_of(made.recording)
+            session = self._store.load(packed, "zip", made.recording, mode="slam", name=named).id
             with storing("The files cannot be named"):
                 packed.rename(_files(made, session))
             return session, None
         except LidarError as error:
             return None, str(error)
+
+
+def _name_of(recording: str) -> str:
+    """What the map of a recording is called until somebody renames it."""
+    name = Path(recording).stem[:MAX_NAME]
+    return name if name.isprintable() else ""
 
 
 def _output(made: _Making) -> Path:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from lidarcore.closing import Closing
-from lidarcore.errors import UnknownLandmarkError, UnknownSessionError
+from lidarcore.errors import LandmarkError, UnknownLandmarkError, UnknownSessionError
 from lidarcore.landmarks.database import PATIENCE, Database, path_of
 from lidarcore.landmarks.landmark import Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
@@ -17,7 +17,10 @@ from lidarcore.landmarks.stored_wall import forget_walls
 _SESSIONS = """SELECT id, source, mode, started, ended,
     (SELECT count(*) FROM landmarks WHERE landmarks.session = sessions.id),
     (SELECT count(*) FROM walls WHERE walls.session = sessions.id),
-    EXISTS (SELECT 1 FROM grids WHERE grids.session = sessions.id) FROM sessions"""
+    EXISTS (SELECT 1 FROM grids WHERE grids.session = sessions.id), name FROM sessions"""
+
+MAX_NAME = 200
+"""Characters of a session's name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +32,7 @@ class Session:
     landmarks       how many there are
     walls           likewise
     grid            whether there is an occupancy grid
+    name            what people call it; empty if nobody named it
     """
 
     id: int
@@ -39,6 +43,7 @@ class Session:
     landmarks: int
     walls: int = 0
     grid: bool = False
+    name: str = ""
 
 
 class Atlas(Closing):
@@ -60,13 +65,22 @@ class Atlas(Closing):
         self._database.close()
 
     def begin(
-        self, source: str, started: float, mode: str = "", landmarks: Iterable[Landmark] = ()
+        self,
+        source: str,
+        started: float,
+        mode: str = "",
+        landmarks: Iterable[Landmark] = (),
+        name: str = "",
     ) -> LandmarkMap:
-        """A new session and its map, with new landmarks (id None) if they are known; all or nothing."""
+        """A new session and its map, with new landmarks (id None) if they are known; all or nothing.
+
+        Raises LandmarkError if the name cannot be one.
+        """
         check_finite(started=started)
+        name = _name(name)
         with self._database.writing() as connection:
-            query = "INSERT INTO sessions (source, mode, started) VALUES (?, ?, ?) RETURNING id"
-            (session,) = connection.execute(query, (source, mode, started)).fetchone()
+            query = "INSERT INTO sessions (source, mode, started, name) VALUES (?, ?, ?, ?) RETURNING id"
+            (session,) = connection.execute(query, (source, mode, started, name)).fetchone()
             store_landmarks(connection, session, landmarks)
         return LandmarkMap(self._database, session)
 
@@ -76,6 +90,17 @@ class Atlas(Closing):
         with self._database.writing() as connection:
             query = "UPDATE sessions SET ended = max(?2, started) WHERE id = ?1"
             if not connection.execute(query, (session, ended)).rowcount:
+                raise _unknown(session)
+
+    def rename(self, session: int, name: str) -> None:
+        """Name a session, without blanks around; an empty name takes away the one it has.
+
+        Raises UnknownSessionError, or LandmarkError if the name is longer than MAX_NAME or cannot be shown.
+        """
+        name = _name(name)
+        with self._database.writing() as connection:
+            query = "UPDATE sessions SET name = ?2 WHERE id = ?1"
+            if not connection.execute(query, (session, name)).rowcount:
                 raise _unknown(session)
 
     def sessions(self) -> list[Session]:
@@ -147,7 +172,18 @@ class Atlas(Closing):
 
 
 def _session(row: tuple[Any, ...]) -> Session:
-    return replace(Session(*row), grid=bool(row[-1]))
+    session = Session(*row)
+    return replace(session, grid=bool(session.grid))
+
+
+def _name(name: str) -> str:
+    """The name without blanks around. Raises LandmarkError."""
+    name = name.strip()
+    if len(name) > MAX_NAME:
+        raise LandmarkError(f"The name has {len(name)} characters: give one of at most {MAX_NAME}.")
+    if not name.isprintable():
+        raise LandmarkError(f"The name {name!r} has characters that cannot be shown: leave them out.")
+    return name
 
 
 def _unknown(session: int) -> UnknownSessionError:

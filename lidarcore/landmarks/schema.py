@@ -99,6 +99,9 @@ _MIGRATIONS: tuple[tuple[str, ...], ...] = (
             x REAL NOT NULL, y REAL NOT NULL, heading REAL NOT NULL,
             rows INTEGER NOT NULL, columns INTEGER NOT NULL, cells BLOB NOT NULL) STRICT""",
     ),
+    (  # sessions may have names
+        "ALTER TABLE sessions ADD COLUMN name TEXT NOT NULL DEFAULT ''",
+    ),
 )
 VERSION = len(_MIGRATIONS)
 

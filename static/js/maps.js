@@ -1,9 +1,10 @@
-// The maps there are, one for each session: localized in, saved, loaded from a file and deleted here.
+// The maps there are, one for each session: localized in, saved, loaded from a file, named and deleted here.
 
 import { address, request, send } from "./api.js";
 import { $, el, icon, iconButton, remake } from "./dom.js";
 import { reloadLandmarks } from "./landmarks.js";
 import { attempt, changeSetting } from "./actions.js";
+import { renameForm } from "./renaming.js";
 import { get, on, set } from "./store.js";
 import { QUESTION_MS, toast } from "./toasts.js";
 import { isOfScans } from "./pose.js";
@@ -15,6 +16,7 @@ const FORMATS = { json: "JSON", csv: "CSV", geojson: "GeoJSON", png: "Picture", 
 const OF_GRID = { zip: "ROS map", png: "Picture" };
 const OF_WALLS = { ...BUILDING, svg: "Plan, SVG", dxf: "Plan, DXF" };
 const LOADED = ["json", "csv", "geojson", "zip"];
+const MAX_NAME = 200; // characters
 const OF_ROS = ["yaml", "yml", "pgm", "png", "bmp"]; // which come together
 
 const clearButton = el(
@@ -48,7 +50,8 @@ export function mountMaps() {
     ),
   );
   on(["panel", "localization", "mapped", "making"], refresh);
-  on(["maps", "localization", "landmarks"], draw);
+  on(["maps", "localization", "landmarks", "renamingMap"], draw);
+  set("renamingMap", null);
   on(["localization", "settings", "maps"], offer);
 }
 
@@ -60,6 +63,15 @@ function refresh(panel, { session, mode }, { walls }, making) {
   listed = wanted;
 }
 
+/** A map in a sentence: its name, where it has one, and its number. */
+const called = ({ id, name }) => (name ? `${name} (map ${id})` : `map ${id}`);
+
+/** The same of a map that may be none of those listed. */
+const calledById = (id) => called(get("maps").sessions.find((session) => session.id === id) ?? { id });
+
+/** As a sentence begins. */
+const begun = (words) => words[0].toUpperCase() + words.slice(1);
+
 async function list() {
   const maps = await attempt(() => request("GET", "sessions"), "The maps could not be listed");
   if (maps) set("maps", maps);
@@ -68,10 +80,11 @@ async function list() {
 const NONE = "None yet. SLAM builds one, or load a file: landmarks, or a map of ROS.";
 const NOT_KEPT = "None yet. A map is kept once its walls were seen from several places, or its landmarks several times.";
 
-function draw({ sessions, store }, { session, mode }, landmarks) {
+function draw({ sessions, store }, { session, mode }, landmarks, renaming) {
   const built = mode === "slam" ? store.session : undefined; // one whose server was killed has no end either
   const live = { session, landmarks: landmarks.size, built, none: mode === "slam" ? NOT_KEPT : NONE };
-  remake($("map-list"), [sessions, store.error, live], () => rows(sessions, store, live));
+  const shown = renaming === null ? [sessions, store.error, live] : renaming; // what is typed stays while a map grows
+  remake($("map-list"), shown, () => rows(sessions, store, { ...live, renaming }));
 }
 
 /** What is saved and cleared is the map that is built or localized in. */
@@ -83,7 +96,7 @@ function offer(localization, { navigation }, { sessions }) {
   const hasWalls = Boolean(sessions.find(({ id }) => id === session)?.walls);
   const formats = hasWalls ? OF_WALLS : ofGrid ? OF_GRID : FORMATS;
   const links = () => (session === null ? [nothingToSave(isNone)] : saveLinks(session, formats));
-  remake($("map-save"), [session, isBuilding, ofGrid, hasWalls, isNone], () => (isBuilding ? buildingLinks() : links()));
+  remake($("map-save"), [calledById(session), isBuilding, ofGrid, hasWalls, isNone], () => (isBuilding ? buildingLinks() : links()));
   clearButton.disabled = session === null;
 }
 
@@ -98,7 +111,9 @@ function rows(sessions, { error }, live) {
 const contentOf = ({ walls, grid, landmarks }) =>
   walls ? `${wholeNumber(walls)} walls` : grid ? "a grid" : `${wholeNumber(landmarks)} landmarks`;
 
-function row({ id, source, mode, started, landmarks, walls, grid }, live) {
+function row(session, live) {
+  const { id, name, source, mode, started, landmarks, walls, grid } = session;
+  if (id === live.renaming) return el("li", {}, renameMap(session));
   const isBuilt = id === live.built;
   const isUsed = isBuilt || id === live.session;
   const count = isUsed ? Math.max(landmarks, live.landmarks) : landmarks;
@@ -108,18 +123,32 @@ function row({ id, source, mode, started, landmarks, walls, grid }, live) {
     {
       type: "button",
       class: "entry",
-      title: `Localize in map ${id}`,
-      "data-key": `map-${id}`,
+      title: `Localize in ${called(session)}`,
+      "data-key": keyOf(id),
       onclick: () => chooseMap(id),
     },
-    el("span", {}, `Map ${id}`),
+    el("span", {}, name || `Map ${id}`),
     el("small", {}, holds),
   );
   if (isUsed) button.setAttribute("aria-current", "true");
-  const about = [isBuilt && "being built", source, mode === "import" && "loaded", moment(started)].filter(Boolean).join(", ");
+  const about = [name && `Map ${id}`, isBuilt && "being built", source, mode === "import" && "loaded", moment(started)].filter(Boolean).join(", ");
   const lost = grid && !walls ? holds : `${holds} and their history`;
-  const remove = iconButton("delete", `Delete map ${id}`, () => confirmDelete(id, lost));
-  return el("li", {}, button, remove, el("p", { class: "about muted" }, about));
+  const rename = iconButton("rename", `Rename ${called(session)}`, () => set("renamingMap", id));
+  const remove = iconButton("delete", `Delete ${called(session)}`, () => confirmDelete(id, lost));
+  return el("li", {}, button, rename, remove, el("p", { class: "about muted" }, about));
+}
+
+const keyOf = (id) => `map-${id}`;
+
+function renameMap(session) {
+  const { id, name } = session;
+  const rename = async (changed) => {
+    await attempt(() => request("PATCH", `sessions/${id}`, { name: changed }), "The map was not renamed");
+    await list();
+  };
+  const end = () => set("renamingMap", null);
+  const label = `New name of ${called(session)}`;
+  return renameForm({ value: name, label, key: keyOf(id), placeholder: `Map ${id}`, maxLength: MAX_NAME, rename, end });
 }
 
 const nothingToSave = (isNone) =>
@@ -133,9 +162,9 @@ const buildingLinks = () => [
 ];
 
 const saveLinks = (session, formats) => [
-  el("p", { class: "muted" }, `Save map ${session} as`),
+  el("p", { class: "muted" }, `Save ${calledById(session)} as`),
   ...Object.entries(formats).map(([format, name]) =>
-    saveLink(`map?format=${format}&session=${session}`, `map-${session}.${format}`, name, `map ${session}`),
+    saveLink(`map?format=${format}&session=${session}`, `map-${session}.${format}`, name, calledById(session)),
   ),
 ];
 
@@ -149,7 +178,7 @@ const saveLink = (path, download, name, what) =>
 function chooseMap(session) {
   if (get("settings").navigation.mode !== "slam") return localizeIn(session);
   toast("The map that SLAM builds is kept, but cannot be gone on with.", {
-    title: `End SLAM, and localize in map ${session}?`,
+    title: `End SLAM, and localize in ${calledById(session)}?`,
     action: { label: "Localize", run: () => localizeIn(session) },
     linger: QUESTION_MS,
   });
@@ -170,7 +199,7 @@ function confirmDelete(session, lost) {
     await list();
   };
   toast(`This also deletes its ${lost}.`, {
-    title: `Delete map ${session}?`,
+    title: `Delete ${calledById(session)}?`,
     action: { label: "Delete", run: remove },
     linger: QUESTION_MS,
   });
@@ -184,7 +213,7 @@ function confirmClear(session) {
     await Promise.all([list(), reloadLandmarks()]);
   };
   toast("This deletes its landmarks and their history. SLAM starts again with an empty map.", {
-    title: `Clear map ${session}?`,
+    title: `Clear ${calledById(session)}?`,
     action: { label: "Clear", run: () => attempt(clear, "The map was not cleared") },
     linger: QUESTION_MS,
   });
@@ -205,7 +234,7 @@ async function load(files) {
   await list();
   const action = { label: "Localize in it", run: () => localizeIn(loaded.id) };
   toast(`${name}: ${contentOf(loaded)}`, {
-    title: `Map ${loaded.id} is loaded`,
+    title: `${begun(called(loaded))} is loaded`,
     action,
   });
 }

@@ -7,6 +7,7 @@ import { attempt, open } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { toast } from "./toasts.js";
 import { makeMap } from "./making.js";
+import { renameForm } from "./renaming.js";
 import { bytes, duration } from "./units.js";
 
 export function mountRecordings() {
@@ -64,7 +65,7 @@ function drawLibrary({ folder, recordings }, source, recorder, known, renaming) 
 function row(recording, playing, renaming) {
   const { name, builtin = false } = recording;
   if (isGrowing(recording)) return el("li", {}, entryText(name, "is being recorded"));
-  if (name === renaming) return el("li", {}, renameForm(name));
+  if (name === renaming) return el("li", {}, renameRecording(name));
   const isPlaying = name === playing;
   const button = el(
     "button",
@@ -114,27 +115,13 @@ function changeButtons(name, isPlaying) {
   return [rename, remove];
 }
 
-function renameForm(name) {
-  const input = el("input", { type: "text", value: name, required: true, "aria-label": `New name of ${name}`, "data-key": name });
-  const submit = async (event) => {
-    event.preventDefault();
-    const change = { name: input.value.trim() };
-    const done = await attempt(() => request("PATCH", pathOf(name), change), "The recording was not renamed");
+function renameRecording(name) {
+  const rename = async (changed) => {
+    const done = await attempt(() => request("PATCH", pathOf(name), { name: changed }), "The recording was not renamed");
     if (done) await refreshRecordings();
-    set("renaming", null);
   };
-  const cancel = ({ key }) => key === "Escape" && set("renaming", null);
-  const form = el(
-    "form",
-    { class: "fields", onsubmit: submit, onkeydown: cancel },
-    input,
-    el("button", { type: "submit", class: "button" }, "Rename"),
-  );
-  requestAnimationFrame(() => {
-    input.focus();
-    input.setSelectionRange(0, stem(name).length);
-  });
-  return form;
+  const end = () => set("renaming", null);
+  return renameForm({ value: name, label: `New name of ${name}`, key: name, selected: stem(name).length, required: true, rename, end });
 }
 
 async function removeRecording(name) {

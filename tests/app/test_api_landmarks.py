@@ -259,6 +259,7 @@ def test_sessions_are_listed_cleared_and_deleted(maps: Maps) -> None:
         "id": passing.session, "source": "passing", "mode": "slam", "started": 1.0, "ended": None, "landmarks": 4,
         "walls": 0,
         "grid": False,
+        "name": "",
     }  # fmt: skip
     assert listed["store"]["error"] is None
     assert maps.server.http.delete("/landmarks", params={"session": passing.session}).status_code == 204
@@ -267,6 +268,28 @@ def test_sessions_are_listed_cleared_and_deleted(maps: Maps) -> None:
     assert maps.server.http.delete(f"/sessions/{passing.session}").status_code == 204
     assert maps.server.get("/sessions")["sessions"] == listed["sessions"][:-1]
     assert_problem(maps.server.http.get("/landmarks", params={"session": passing.session}), 404)
+
+
+def test_a_session_is_named_renamed_and_nameless_again(maps: Maps) -> None:
+    session = maps.filled("to be named", 2).session
+    path = f"/sessions/{session}"
+    for given, name in (("  Hall, ground floor ", "Hall, ground floor"), ("ä" * 200, "ä" * 200), (" ", "")):
+        assert maps.server.change("PATCH", path, {"name": given})["name"] == name
+        assert maps.server.get("/sessions")["sessions"][-1]["name"] == name
+    maps.server.change("PATCH", path, {"name": "kept"})
+    for wrong, words in (
+        ("x" * 201, "at most 200"),
+        ("two\nlines", "cannot be shown"),
+        (7, "string"),
+        (None, ""),
+    ):
+        problem = assert_problem(maps.server.http.patch(path, json={"name": wrong}), 422)
+        assert words in problem["detail"]
+    assert_problem(maps.server.http.patch(path, json={}), 422)
+    assert maps.server.get("/sessions")["sessions"][-1]["name"] == "kept"
+    unknown = assert_problem(maps.server.http.patch("/sessions/999", json={"name": "x"}), 404)
+    assert "no session 999" in unknown["detail"]
+    maps.server.http.delete(path).raise_for_status()
 
 
 @pytest.mark.parametrize("name", ["json", "csv", "geojson"])

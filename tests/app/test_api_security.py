@@ -31,6 +31,7 @@ MUTATIONS = [
     ("POST", "/map/making", {"recording": "room.npz"}),
     ("DELETE", "/map/making", None),
     ("DELETE", "/landmarks", None),
+    ("PATCH", "/sessions/1", {"name": "hall"}),
     ("DELETE", "/sessions/1", None),
     ("DELETE", "/repeatability", None),
     ("POST", "/calibration", {}),
@@ -67,8 +68,8 @@ def test_every_mutating_route_is_covered_by_these_tests(shared_server: Server) -
     routes = {(m.upper(), path) for path, methods in paths.items() for m in methods if m != "get"}
     names = {f"/api/v1{path}": method for method, path, _ in MUTATIONS}
     assert (
-        len(routes) == len(names) + 3
-    )  # PUT and PATCH of /source, POST and DELETE of /calibration and /map/making
+        len(routes) == len(names) + 4
+    )  # PUT and PATCH of /source, POST and DELETE of /calibration and /map/making, PATCH and DELETE of /sessions/{id}
     assert all(
         path.replace("{name}", "new.npz").replace("{id}", "1") in names or "{name}" in path
         for _, path in routes

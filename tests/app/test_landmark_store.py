@@ -128,6 +128,14 @@ def finish(store: LandmarkStore, replay: str | None, until: float = 5.0) -> int:
     return run.session
 
 
+def test_a_map_that_was_named_is_kept_when_what_is_replayed_begins_again(store: LandmarkStore) -> None:
+    first = finish(store, "again and again")
+    store.atlas.rename(first, "hall")
+    finish(store, "again and again")
+    third = finish(store, "again and again")
+    wait_until(lambda: [session.id for session in store.atlas.sessions()] == [first, third])
+
+
 @pytest.mark.parametrize(("replay", "is_replaced"), [("again and again", True), (None, False)])
 def test_only_of_what_is_replayed_a_finished_map_takes_the_place_of_the_one_before(
     store: LandmarkStore, replay: str | None, is_replaced: bool

@@ -64,6 +64,7 @@ def test_a_map_of_a_recording_becomes_a_session_and_files_with_honest_poses(serv
     assert (made["state"], made["error"], made["done"]) == ("finished", None, 100)
     (session,) = server.get("/sessions")["sessions"]
     assert (session["id"], session["source"], session["mode"]) == (made["session"], "drive.mcap", "slam")
+    assert session["name"] == "drive"
     assert session["grid"]
     assert len(server.get("/walls", session=made["session"])["walls"]) == session["walls"] > 5
 

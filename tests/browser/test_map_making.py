@@ -1,12 +1,18 @@
 """A finished map of a recording, from the page: made, localized in with its walls, and saved with the poses."""
 
 import io
+import json
+from collections.abc import Callable
 from zipfile import ZipFile
 
-from browsing import Visitor
+import pytest
+from browsing import Server, Visitor
 from playwright.sync_api import expect
+from waiting import wait_until
 
 DEMO = "emulated-s1.mcap"
+CORNER = {"x": 1, "y": 2, "var_x": 1e-4, "cov_xy": 0, "var_y": 1e-4, "kind": "corner"}
+MAP = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [CORNER]}
 
 
 def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) -> None:
@@ -33,8 +39,68 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     assert {row.split()[0] for row in page.locator("#mapped-table tbody tr").all_inner_texts()} == kept
     row = page.locator("#map-list li", has_text=f"Map {session}")
     expect(row).to_contain_text(f"{len(kept)} walls")
+    expect(row.locator(".entry span")).to_have_text("emulated-s1")
     server.patch("settings", {"navigation": None})
     server.api.delete(f"sessions/{session}").raise_for_status()
+
+
+@pytest.mark.parametrize(("width", "theme"), [(1400, "light"), (390, "dark")])
+def test_a_map_is_named_by_the_keyboard_and_nameless_again(
+    visit: Callable[..., Visitor], server: Server, width: int, theme: str
+) -> None:
+    id = server.api.post("map", json=MAP).raise_for_status().json()["id"]
+    page = visit(width, 844, theme=theme).open().page
+    page.get_by_role("tab", name="Map").click()
+    row = page.locator("#map-list li").first
+
+    def rename(before: str, name: str) -> None:
+        row.get_by_role("button", name=f"Rename {before}", exact=True).press("Enter")
+        field = page.get_by_label(f"New name of {before}", exact=True)
+        expect(field).to_be_focused()
+        field.fill(name)
+        field.press("Enter")
+
+    long = "Hall, ground floor, " * 8
+    for before, name, after in (
+        (f"map {id}", "  hall ", f"hall (map {id})"),
+        (f"hall (map {id})", long, f"{long.strip()} (map {id})"),
+    ):
+        rename(before, name)
+        shown = page.get_by_title(f"Localize in {after}", exact=True)
+        expect(shown).to_be_focused()
+        expect(shown).to_contain_text(name.strip())
+        expect(row.locator(".about")).to_contain_text(f"Map {id}, a file")
+        expect(row.get_by_role("button", name=f"Delete {after}")).to_be_in_viewport()
+        assert server.get("sessions")["sessions"][-1]["name"] == name.strip()
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    row.get_by_role("button", name=f"Rename {after}").click()
+    page.get_by_label(f"New name of {after}").fill("another")
+    page.keyboard.press("Escape")
+    expect(row).to_contain_text(long.strip())
+    rename(after, " ")
+    expect(row.locator(".entry span")).to_have_text(f"Map {id}")
+    assert server.get("sessions")["sessions"][-1]["name"] == ""
+    server.api.delete(f"sessions/{id}").raise_for_status()
+
+
+def test_a_name_that_is_being_typed_stays_when_another_map_comes(visitor: Visitor) -> None:
+    page, server = visitor.page, visitor.server
+    id = server.api.post("map", json=MAP).raise_for_status().json()["id"]
+    page.get_by_role("tab", name="Map").click()
+    page.get_by_role("button", name=f"Rename map {id}", exact=True).click()
+    field = page.get_by_label(f"New name of map {id}", exact=True)
+    field.fill("hal")
+    file = {"name": "another.json", "mimeType": "application/json", "buffer": json.dumps(MAP).encode()}
+    page.locator("#map-file").set_input_files(file)
+    expect(page.locator(".toast")).to_contain_text("another.json")
+    wait_until(lambda: visitor.knows("maps")["sessions"][-1]["id"] == id + 1, "the page knows of it")
+    expect(field).to_be_focused()
+    field.press("l")
+    field.press("Enter")
+    expect(page.get_by_title(f"Localize in hall (map {id})")).to_be_visible()
+    expect(page.get_by_title(f"Localize in map {id + 1}")).to_be_visible()
+    for one in (id, id + 1):
+        server.api.delete(f"sessions/{one}").raise_for_status()
 
 
 def test_a_map_that_takes_too_long_is_cancelled(visitor: Visitor) -> None:

@@ -17,7 +17,7 @@ from hypothesis.stateful import Bundle, RuleBasedStateMachine, consumes, initial
 from landmark_maps import RandomLandmarks, corner
 
 from lidarcore.errors import LandmarkError, LandmarkMapError, UnknownLandmarkError, UnknownSessionError
-from lidarcore.landmarks import Atlas, Box, Session
+from lidarcore.landmarks import MAX_NAME, Atlas, Box, Session
 
 WRITER = """
 import sys
@@ -341,6 +341,33 @@ def test_walls_of_a_file_of_version_3_begin_their_history_with_what_they_are(tmp
         atlas[session.id].put_walls(grown)
         assert atlas[session.id].wall_history(0) == grown[:1]  # in the same second
         assert atlas[session.id].wall_history(7) == [walls[1], grown[1]]
+
+
+def test_sessions_of_a_file_of_version_5_have_no_names_until_they_get_one(tmp_path):
+    """Written by the fifth version, which knew no names: a session with a corner."""
+    path = shutil.copy(Path(__file__).with_name("version_5.db"), tmp_path / "old.db")
+    before = Session(1, "hall.mcap", "slam", 1000.0, 1060.0, 1)
+    with Atlas(path) as atlas:
+        assert atlas.sessions() == [before]
+        assert_same(atlas[1], [corner(id=1)])
+        atlas.rename(1, " hall ")
+    with Atlas(path) as atlas:
+        assert atlas.session(1) == replace(before, name="hall")
+        atlas.rename(1, "")
+        assert atlas.session(1) == before
+
+
+def test_a_name_that_cannot_be_shown_or_is_too_long_names_nothing(atlas):
+    for name in ("a\tb", "x" * (MAX_NAME + 1)):
+        with pytest.raises(LandmarkError, match="The name"):
+            atlas.begin("x", 0.0, name=name)
+    assert atlas.sessions() == []
+    session = atlas.begin("x", 0.0, name="x" * MAX_NAME).session
+    with pytest.raises(LandmarkError, match="The name"):
+        atlas.rename(session, "\ud800")
+    assert atlas.session(session).name == "x" * MAX_NAME
+    with pytest.raises(UnknownSessionError):
+        atlas.rename(session + 1, "y")
 
 
 def test_an_empty_file_of_version_1_has_no_session(tmp_path):

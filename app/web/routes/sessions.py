@@ -2,15 +2,17 @@
 
 from typing import Annotated
 
-from fastapi import APIRouter, Path
+from fastapi import APIRouter, Body, Path
+from pydantic import Field
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
-from lidarcore.landmarks import Session
+from lidarcore.landmarks import MAX_NAME, Session
 
 from ...errors import ConflictError
 from ...jobs.landmark_store import StoreStatus
 from ..problems import documented, encode
+from ..schemas import StrictBody
 from .dependencies import Server
 
 router = APIRouter(prefix="/sessions", tags=["landmarks"], responses=documented(503))
@@ -21,10 +23,33 @@ class SessionsJson(TypedDict):
     sessions: list[Session]
 
 
+class SessionChange(StrictBody):
+    """What to change of a session."""
+
+    name: Annotated[
+        str,
+        Field(
+            description="what people call it, of printable characters, without blanks around; empty takes it away",
+            json_schema_extra={"maxLength": MAX_NAME},
+        ),
+    ]
+
+
 @router.get("", response_model=SessionsJson, response_description="All sessions, the oldest first")
 def read(server: Server) -> Response:
     """The maps there are, and how well the running one gets to the disk."""
     return encode({"store": server.landmarks.status, "sessions": server.landmarks.atlas.sessions()})
+
+
+@router.patch("/{id}", response_description="The session", responses=documented(404, 422))
+def rename(
+    server: Server,
+    id: Annotated[int, Path(examples=[3])],
+    change: Annotated[SessionChange, Body(examples=[{"name": "Hall, ground floor"}])],
+) -> Session:
+    """Name a session, also while it is being written. One with a name is kept when a recording plays again."""
+    server.landmarks.atlas.rename(id, change.name)
+    return server.landmarks.atlas.session(id)
 
 
 @router.delete("/{id}", status_code=204, responses=documented(404, 409, 422))
