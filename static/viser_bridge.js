@@ -23,7 +23,7 @@
   let fingers = 0; // or other pointers that are down
   let placing = null; // what takes the drag of a pose
 
-  // What viser sorts splats by, of which there are none here, asks for eval, and is refused it: no fault to report.
+  // A part of viser asks for eval, which the policy refuses, and viser does without: no fault to report.
   addEventListener("unhandledrejection", (event) => event.reason instanceof EvalError && event.preventDefault());
 
   // viser only reconnects while its window has the focus, which a frame or a wall display rarely has.

@@ -1,6 +1,5 @@
 // The form in which a name is changed, in the place of what has it in a list.
 
-import { attempt } from "./actions.js";
 import { el } from "./dom.js";
 
 /** `rename` is given the new name, and asks the server; `end` is called when the form has done its work, or on Escape. */
