@@ -11,6 +11,10 @@ class NotFoundError(LidarError):
     """There is nothing of that name."""
 
 
+class NotYetError(LidarError):
+    """There is nothing yet, but will be."""
+
+
 class ConflictError(LidarError):
     """Something cannot be done now: a name is taken, or something else is under way."""
 

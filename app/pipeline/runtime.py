@@ -17,7 +17,7 @@ from lidarcore.clusters import cluster
 from lidarcore.evaluation.calibration.noise_check import NoiseCheck
 from lidarcore.threads import FailureLog, join
 
-from ..errors import NotFoundError
+from ..errors import NotFoundError, NotYetError
 from ..sources.player import Player
 from ..sources.source import Source
 from ..sources.timed_scan import TimedScan
@@ -82,6 +82,13 @@ class Runtime:
         join(self._worker, END_WITHIN)
         self.navigation.close()
 
+    def newest(self) -> Frame:
+        """The newest frame. Raises NotYetError before the first one."""
+        if self.frame is None:
+            why = "no scan has been processed" if self.ready else "the kernels are still being compiled"
+            raise NotYetError(f"There is no frame yet: {why}. Ask again in a while.")
+        return self.frame
+
     def set(self, patch: Mapping[str, Any]) -> Settings:
         """Change settings by a merge patch; the only way there is. Raises pydantic.ValidationError."""
         with self._lock:
@@ -100,9 +107,8 @@ class Runtime:
         self._refreshed()
 
     def select_corner(self, corner: int | None) -> None:
-        """Select a corner of the current frame, or none. Raises NotFoundError."""
-        known = {row.id for row in self.frame.corners} if self.frame else set()
-        if corner is not None and corner not in known:
+        """Select a corner of the current frame, or none. Raises NotFoundError, NotYetError."""
+        if corner is not None and corner not in (known := {row.id for row in self.newest().corners}):
             raise NotFoundError(f"There is no corner {corner} in the current frame; it has {sorted(known)}.")
         self.selection = replace(self.selection, corner=corner)
         self._refreshed()

@@ -16,12 +16,21 @@ from starlette.routing import Match
 from lidarcore import LidarError, TopicError
 from lidarcore import errors as library
 
-from ..errors import ConflictError, NotFoundError, StorageError, TooLargeError, explained, invalid_values
+from ..errors import (
+    ConflictError,
+    NotFoundError,
+    NotYetError,
+    StorageError,
+    TooLargeError,
+    explained,
+    invalid_values,
+)
 
 # The nearest class of an error decides.
 STATUS: dict[type, int] = {
     LidarError: 422,
     NotFoundError: 404,
+    NotYetError: 503,
     ConflictError: 409,
     TooLargeError: 413,
     StorageError: 507,
@@ -40,6 +49,7 @@ STATUS: dict[type, int] = {
     library.LandmarkMapError: 503,  # the file of maps fails
 }
 
+RETRY = {"Retry-After": "2"}  # s
 _METHODS = ("DELETE", "GET", "HEAD", "PATCH", "POST", "PUT")
 
 
@@ -129,7 +139,8 @@ def _answers(request: Request, method: str) -> bool:
 def _problem(error: LidarError) -> ProblemError:
     status = next(STATUS[kind] for kind in type(error).__mro__ if kind in STATUS)
     members: dict[str, Any] = {"topics": list(error.topics)} if isinstance(error, TopicError) else {}
-    return ProblemError(status, str(error), **members)
+    headers = RETRY if isinstance(error, NotYetError) else None
+    return ProblemError(status, str(error), headers, **members)
 
 
 def _invalid(error: RequestValidationError | ValidationError) -> ProblemError:

@@ -4,6 +4,7 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
+import httpx
 import lidarcore_app.pipeline.runtime
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from lidarcore_app.web.schemas import CornerJson, FrameJson, SegmentJson
 from pydantic import TypeAdapter
 from serving import CORNERS, Server, assert_problem, chosen, strict_json
 
-from lidarcore import FITTERS, ExtractionSettings, compare, open_recording
+from lidarcore import FITTERS, Client, ExtractionSettings, compare, open_recording
+from lidarcore.errors import ClientError
 
 
 def test_a_frame_is_what_its_schema_says(server: Server) -> None:
@@ -90,6 +92,12 @@ def test_a_fitter_that_is_not_in_the_frame_is_not_found(server: Server) -> None:
         assert_problem(server.http.get(path, params={"format": "xml"}), 422)
 
 
+def assert_not_yet(answer: httpx.Response) -> None:
+    """It says that the server is still starting, and when to ask again."""
+    assert "still being compiled" in assert_problem(answer, 503)["detail"]
+    assert float(answer.headers["Retry-After"]) > 0
+
+
 def test_while_the_kernels_compile_the_server_answers_and_says_so(
     make_server: Callable[..., Server], monkeypatch: pytest.MonkeyPatch, room: Path
 ) -> None:
@@ -99,8 +107,20 @@ def test_while_the_kernels_compile_the_server_answers_and_says_so(
     with server.stream() as stream:
         assert stream.state()["ready"] is False
         assert server.get("/health")["ready"] is False
-        for path in ("/frame", "/segments", "/corners"):
-            assert "compiled" in assert_problem(server.http.get(path), 404)["detail"]
+        assert_problem(server.http.get("/pose"), 404)  # nothing is localized
+        server.change("PATCH", "/settings", {"navigation": {"mode": "slam", "method": "scans"}})
+        for path in ("/frame", "/segments", "/corners", "/clusters", "/pose"):
+            assert_not_yet(server.http.get(path))
+        places = {"first": "corner@1,1", "second": "corner@2,2"}
+        assert_not_yet(server.http.get("/measure", params=places))
+        assert_not_yet(server.http.put("/selection", json={"corner": 1}))
+        with (
+            Client(server.url) as client,
+            pytest.raises(ClientError, match="still being compiled") as refused,
+        ):
+            client.corners()
+        assert refused.value.status == 503
+        server.change("PATCH", "/settings", {"navigation": None})
         server.change("PUT", "/source", {"kind": "recording", "name": room.name})
         assert server.get("/source")["state"] == "loading"
         compiled.set()

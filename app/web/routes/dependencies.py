@@ -5,7 +5,6 @@ from typing import Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from ...errors import NotFoundError
 from ...pipeline.frame import Frame
 from ..state import State
 
@@ -20,10 +19,7 @@ Server = Annotated[State, Depends(_state)]
 
 
 async def _frame(server: Server) -> Frame:
-    if server.runtime.frame is None:
-        why = "no scan has been processed" if server.runtime.ready else "the kernels are still being compiled"
-        raise NotFoundError(f"There is no frame yet: {why}.")
-    return server.runtime.frame
+    return server.runtime.newest()
 
 
 CurrentFrame = Annotated[Frame, Depends(_frame)]

@@ -18,7 +18,7 @@ from ..schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
 from ..serializers import clusters_json, corners_json, frame_text, segments_json
 from .dependencies import CurrentFrame, Server
 
-router = APIRouter(tags=["frame"], responses=documented(404, 422))
+router = APIRouter(tags=["frame"], responses=documented(404, 422, 503))
 
 Fitter = Annotated[
     str | None, Query(description="a method of the frame; the main one if not given", examples=["ml"])

@@ -9,9 +9,16 @@ from pydantic import Field, TypeAdapter, WithJsonSchema
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
-from ...errors import NO_BODY, NotFoundError
-from ...pipeline.navigation import SIGMA_HEADING, SIGMA_POSITION, LocalizationStatus, Navigation
+from ...errors import NO_BODY, NotFoundError, NotYetError
+from ...pipeline.navigation import (
+    NOT_LOCALIZED,
+    SIGMA_HEADING,
+    SIGMA_POSITION,
+    LocalizationStatus,
+    Navigation,
+)
 from ...pipeline.runtime import Runtime
+from ...pipeline.slam_run import Localization
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
 from ...records import record
@@ -99,13 +106,10 @@ def choose_map(
     return server.runtime.localization()
 
 
-@router.get("/pose", response_description="The pose after the newest scan", responses=documented(404))
+@router.get("/pose", response_description="The pose after the newest scan", responses=documented(404, 503))
 def pose(server: Server) -> CurrentPoseJson:
     """Where the sensor is."""
-    localization = server.runtime.frame.localization if server.runtime.frame else None
-    if localization is None:
-        raise NotFoundError(f"There is no pose: {_why(server.runtime)}")
-    found = localization.tracking
+    found = _localized(server.runtime).tracking
     estimate = found.estimate
     return record(CurrentPoseJson, found, **pose_json(estimate.pose), covariance=estimate.covariance.tolist())
 
@@ -162,7 +166,11 @@ def _poses(body: Any) -> list[OdometryPose]:
     return [OdometryPose.model_validate(body)]
 
 
-def _why(runtime: Runtime) -> str:
-    if runtime.settings.navigation.mode == "off":
-        return "nothing is localized; set navigation.mode to slam or localize."
-    return runtime.navigation.problem or "no scan has been processed yet."
+def _localized(runtime: Runtime) -> Localization:
+    """What the newest frame says of the pose. Raises NotFoundError, NotYetError."""
+    problem = NOT_LOCALIZED if runtime.settings.navigation.mode == "off" else runtime.navigation.problem
+    if problem:
+        raise NotFoundError(f"There is no pose. {problem}")
+    if (found := runtime.newest().localization) is None:
+        raise NotYetError("There is no pose yet: no scan has been localized. Ask again in a while.")
+    return found

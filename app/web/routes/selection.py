@@ -32,7 +32,7 @@ def read(server: Server) -> Selection:
     return server.runtime.selection
 
 
-@router.put("", response_description="What is selected", responses=documented(404, 422))
+@router.put("", response_description="What is selected", responses=documented(404, 422, 503))
 def select(
     server: Server,
     selection: Annotated[SelectionBody, Body(examples=[{"corner": 12}])],
