@@ -76,11 +76,13 @@ const COUNTS = [
   {
     key: "locate",
     label: "Time per scan",
-    hint: "Time to estimate the pose and update the map; none for a scan before the newest one",
-    read: (_, { locate_us: took }) => took ?? NaN,
+    hint: "Time to estimate the pose and update the map, of the last scan that was new: one that is shown again takes none",
+    read: () => took,
     text: microseconds,
   },
 ];
+
+let took = null; // µs, by the last scan that was new
 
 /** The figures, kept up to date. */
 export function posePanel() {
@@ -140,8 +142,11 @@ function skippedText({ localization: now, dropped, source }) {
   return `${wholeNumber(skipped)} scans were skipped: at this speed the map cannot keep up. Press Reset and play from the beginning at the speed max, which waits for every scan.`;
 }
 
-function draw(frame, { navigation }, source, connection, { problem }) {
-  const { localization: now, timings } = frame;
+function draw(frame, { navigation }, source, connection, localization) {
+  const { timings } = frame;
+  const now = isOfRun(frame.localization, localization) ? frame.localization : null;
+  took = timings.locate_us ?? took;
+  $("count-locate").parentElement.hidden = took === null;
   $("pose-panel").hidden = navigation.mode === "off";
   if (navigation.mode === "off") return;
   const stale = isStale(source, connection);
@@ -149,7 +154,7 @@ function draw(frame, { navigation }, source, connection, { problem }) {
   $("pose-panel-state").dataset.state = stale || !now ? "" : now.state;
   setText(
     $("pose-panel-state"),
-    stale ? "Unknown, no scans arrive. Last known pose:" : stateText(now, problem),
+    stale ? "Unknown, no scans arrive. Last known pose:" : stateText(now, localization.problem),
   );
   const message = [now?.message, skippedText(frame)].filter(Boolean).join(" ");
   $("pose-panel-message").hidden = !message;
@@ -159,7 +164,7 @@ function draw(frame, { navigation }, source, connection, { problem }) {
     setText($(`pose-sigma-${key}`), hasPose(now) ? sigma(now) : "");
   }
   for (const { key, read, text = wholeNumber } of COUNTS)
-    setText($(`count-${key}`), now ? text(read(now, timings)) : UNKNOWN);
+    setText($(`count-${key}`), now ? text(read(now)) : UNKNOWN);
   const lines = now ? comparison(now) : [];
   $("nis-about").hidden = !now?.dof;
   remake($("comparison"), lines, () =>
@@ -167,9 +172,12 @@ function draw(frame, { navigation }, source, connection, { problem }) {
   );
 }
 
+/** Whether a pose is of the mode and map that are set: they begin with a scan, and the frame before it stays until then. */
+const isOfRun = (pose, { mode, session }) => pose?.mode === mode && (mode === "slam" || pose.session === session);
+
 const hasPose = (now) => now && !isSought(now);
 
 function stateText(now, problem) {
-  if (!now) return problem ?? "Waiting for a scan";
+  if (!now) return problem ?? "Begins with the next scan";
   return STATES[isSought(now) ? "searching" : now.state];
 }

@@ -1,12 +1,15 @@
 """What the page says of the pose, where whole scans tell it."""
 
+import json
 import re
+from collections.abc import Callable
 
 import pytest
 from browsing import Server, Visitor
-from playwright.sync_api import expect
+from playwright.sync_api import WebSocketRoute, expect
 from waiting import wait_until
 
+DEMO = "emulated-s1.mcap"
 WINDSOR = "real-rplidar-windsor.npz"  # of a sensor that is mounted sideways
 WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
 
@@ -68,3 +71,57 @@ def test_innovations_are_plotted_only_of_a_filter_that_has_some(visitor: Visitor
     expect(figures.filter(has_text="nnovations")).to_have_count(0)
     server.patch("settings", {"navigation": {"mode": "slam", "method": "landmarks"}})
     expect(figures.filter(has_text="nnovations")).to_have_count(2)
+
+
+def test_the_time_per_scan_stays_when_a_recording_is_played_again_at_full_speed(visitor: Visitor) -> None:
+    """No pose is estimated a second time: what is shown is what the last scan that was new took."""
+    server, page = visitor.server, visitor.page
+    page.get_by_role("tab", name="Map").click()
+    server.api.put("source", json={"kind": "recording", "name": DEMO}).raise_for_status()
+    server.patch("source", {"speed": 0, "loop": True})
+    server.patch("settings", WHOLE_SCANS)
+    wait_until(lambda: visitor.knows("frame")["localization"], "scans are localized")
+    wait_until(lambda: visitor.knows("frame")["timings"]["locate_us"] is None, "it is played again")
+    expect(page.locator("#count-locate")).to_have_text(re.compile(r"^\d.*s$"))
+    page.reload()
+    expect(page.locator("#pose-x")).to_have_text(re.compile(r"\d"))
+    expect(page.get_by_text("Time per scan", exact=True).first).to_be_hidden()  # nothing tells it
+
+
+def hold_frames(visitor: Visitor) -> Callable[[], None]:
+    """What is called keeps all frames to come from the page, as a server does that takes its time with one."""
+    is_held = False
+
+    def hold() -> None:
+        nonlocal is_held
+        is_held = True
+
+    def join(socket: WebSocketRoute) -> None:
+        def pass_on(text: str | bytes) -> None:
+            if not (is_held and json.loads(text)["type"] == "frame"):
+                socket.send(text)
+
+        socket.connect_to_server().on_message(pass_on)
+
+    visitor.page.route_web_socket(re.compile("/api/v1/stream"), join)
+    return hold
+
+
+def test_a_pose_of_slam_is_not_taken_for_one_in_the_map_that_is_localized_in(
+    visit: Callable[..., Visitor],
+) -> None:
+    """The map is finished first, which takes long where it is large: the last frame of SLAM stays meanwhile."""
+    visitor = visit()
+    hold = hold_frames(visitor)
+    server, page = visitor.open().server, visitor.page
+    page.get_by_role("tab", name="Map").click()
+    open_windsor(server)
+    for _ in range(5):
+        frame = server.step(1)
+    visitor.await_frame(frame)
+    expect(page.locator("#pose-panel-state")).to_have_text("Tracking")
+    hold()
+    server.patch("settings", {"navigation": {"mode": "localize"}})
+    expect(page.locator("#pose-panel-state")).to_have_text("Begins with the next scan")
+    expect(page.locator("#pose-x")).to_have_text("\N{EN DASH}")
+    assert visitor.knows("frame")["localization"]["state"] == "tracking"
