@@ -1,4 +1,5 @@
-// Messages that come and go, read out by screen readers. One that is pointed at or has the focus stays.
+// Messages that come and go, read out by screen readers. One that is pointed at or has the focus stays. Where there is
+// little room, only the newest is seen, with how many more there are.
 
 import { $, el, iconButton } from "./dom.js";
 
@@ -7,6 +8,11 @@ export const QUESTION_MS = 30_000; // for messages that ask something
 const LINGER_MS = 12_000;
 const LOOK_AGAIN_MS = 2000;
 const MOST = 3;
+
+new MutationObserver(() => {
+  const more = $("toasts").children.length - 1;
+  $("toasts").dataset.more = more > 0 ? `and ${more} more` : "";
+}).observe($("toasts"), { childList: true });
 
 /** Shows a message; `action` is an optional {label, run}, `about` what `clearToasts` clears it by. */
 export function toast(text, { title = "", kind = "info", action = null, about = "", linger = LINGER_MS } = {}) {
@@ -32,6 +38,7 @@ export function clearToasts(about) {
 function removeLater(node, wait) {
   setTimeout(() => {
     if (node.matches(":hover, :focus-within")) removeLater(node, LOOK_AGAIN_MS);
+    else if (node.isConnected && !node.checkVisibility()) removeLater(node, wait); // a newer one is seen in its place
     else node.remove();
   }, wait);
 }

@@ -93,6 +93,47 @@ def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
     expect(phone.page.frame_locator("#scene").get_by_text("Connected")).to_be_hidden()
 
 
+TWO_MESSAGES = """import('/static/js/toasts.js').then(({ toast }) => {
+  for (const title of ["Earlier", "Newest"]) toast("It says so.", { title });
+})"""
+
+
+def test_messages_are_shown_one_at_a_time_on_a_phone(phone: Visitor) -> None:
+    page = phone.page
+    page.evaluate(TWO_MESSAGES)
+    earlier, newest = (page.locator(".toast", has_text=title) for title in ("Earlier", "Newest"))
+    expect(newest).to_be_visible()
+    expect(earlier).to_be_hidden()
+    expect(page.locator("#toasts")).to_have_attribute("data-more", "and 1 more")
+    newest.get_by_role("button", name="Dismiss this message").tap()
+    expect(earlier).to_be_visible()
+    expect(page.locator("#toasts")).to_have_attribute("data-more", "")
+
+
+def test_a_message_that_another_one_covers_on_a_phone_is_still_read_afterwards(
+    visit: Callable[..., Visitor],
+) -> None:
+    visitor = visit(390, 844)
+    visitor.page.clock.install()
+    page = visitor.open().page
+    page.evaluate(TWO_MESSAGES)
+    page.clock.fast_forward(12_500)
+    expect(page.locator(".toast:visible")).to_contain_text(["Earlier"])
+    page.clock.fast_forward(12_500)
+    expect(page.locator(".toast")).to_have_count(0)
+
+
+def test_messages_cover_no_table_on_a_desk(visit: Callable[..., Visitor]) -> None:
+    page = visit(1400, 900).open().page
+    page.evaluate(TWO_MESSAGES)
+    expect(page.locator(".toast:visible")).to_have_count(2)
+    messages, timeline = (page.locator(name).bounding_box() for name in ("#toasts", "#timeline"))
+    assert messages["y"] + messages["height"] <= timeline["y"]
+    stage = page.locator("#stage").bounding_box()
+    assert stage["x"] <= messages["x"]
+    assert messages["x"] + messages["width"] <= stage["x"] + stage["width"]
+
+
 def test_a_phone_on_its_side_has_the_panel_beside_the_view(visit: Callable[..., Visitor]) -> None:
     page = visit(844, 390, has_touch=True, is_mobile=True).open().page
     page.get_by_role("tab", name="Setup").tap()
