@@ -1,33 +1,38 @@
 // The table of corners: one row each, with position, deviations and ellipse area. A comparison begins with its answer:
-// how the ellipses of each method fit the scatter; the corners below are the detail.
+// how the ellipses of each method fit the scatter; the corners below are the detail, on a phone the areas alone.
 
 import { answerRows, drawAnswer } from "./answer.js";
 import { $, el, setText, swatch } from "./dom.js";
 import { selectableRows } from "./rows.js";
 import { select } from "./actions.js";
-import { on } from "./store.js";
+import { get, on } from "./store.js";
 import { degrees, metres, millimetres, squareMillimetres, UNKNOWN } from "./units.js";
 
 const PLACE = [
   { key: "x", label: "x", unit: "m", text: metres },
   { key: "y", label: "y", unit: "m", text: metres },
 ];
-const CLAIMS = [
+const SIGMAS = [
   { key: "sigma_x", label: "σx", unit: "mm", text: millimetres },
   { key: "sigma_y", label: "σy", unit: "mm", text: millimetres },
-  { key: "area", label: "area", unit: "mm²", text: squareMillimetres },
 ];
+const AREA = [{ key: "area", label: "area", unit: "mm²", text: squareMillimetres }];
 const ANGLE = [{ key: "angle", label: "angle", unit: "°", text: degrees }];
+
+const NARROW = matchMedia("(max-width: 479px)");
+
+/** What each method claims: of several, a phone has room for the areas. */
+const claimsOf = (methods) => (NARROW.matches && methods.length > 1 ? AREA : [...SIGMAS, ...AREA]);
 
 /** The columns: {method, quantity}; where a corner is and its angle are told once, by the first method that has it. */
 const columnsFor = (methods) => [
   ...PLACE.map((quantity) => ({ quantity })),
-  ...methods.flatMap((method) => CLAIMS.map((quantity) => ({ method, quantity }))),
+  ...methods.flatMap((method) => claimsOf(methods).map((quantity) => ({ method, quantity }))),
   ...ANGLE.map((quantity) => ({ quantity })),
 ];
 
 const DENSE = 3; // methods beyond which the columns have to be narrow
-let columns = ""; // the methods the header is made for
+let columns = ""; // what the header is made for: the methods, and whether there is little room
 let rows;
 
 export function mountCorners() {
@@ -40,32 +45,41 @@ export function mountCorners() {
   on(["frame", "methods"], draw);
   on(["selection"], ({ corner }) => rows.mark(corner));
   on(["frame", "repeatability"], drawAnswer);
+  NARROW.addEventListener("change", () => {
+    const frame = get("frame");
+    if (!frame) return;
+    draw(frame, get("methods"));
+    drawAnswer(frame, get("repeatability"));
+  });
 }
 
 /** Selects the corner `by` rows further; the first or last one if none is selected. */
 export const nextCorner = (by) => rows.step(by);
 
 function draw({ methods, corners }, known) {
-  if (methods.join() !== columns) makeHead(methods, known);
+  if (keyOf(methods) !== columns) makeHead(methods, known);
   const sorted = [...corners].sort((a, b) => a.id - b.id);
   rows.update(sorted.map(({ id, by_method }) => ({ id, by_method, methods })));
   setText($("corner-count"), corners.length);
   $("corner-none").hidden = corners.length > 0;
 }
 
+const keyOf = (methods) => [NARROW.matches, ...methods].join();
+
 function makeHead(methods, known) {
-  columns = methods.join();
+  columns = keyOf(methods);
   rows.update([]);
-  $("corner-table").classList.toggle("dense", methods.length > DENSE);
+  const each = claimsOf(methods).length;
+  $("corner-table").classList.toggle("dense", NARROW.matches || methods.length > DENSE);
   const titles = new Map(known.map(({ name, title }) => [name, title]));
   const groups = methods.map((name) => {
     const title = titles.get(name) ?? name;
-    return el("th", { scope: "colgroup", colSpan: CLAIMS.length, class: "group", title }, swatch(name), name);
+    return el("th", { scope: "colgroup", colSpan: each, class: "group", title }, swatch(name), name);
   });
   const heads = columnsFor(methods).map(({ quantity: { key, label, unit } }) =>
     el("th", { scope: "col", class: key }, label, el("span", { class: "unit" }, ` ${unit}`)),
   );
-  const answers = methods.length > 1 ? answerRows(methods, { before: PLACE.length, each: CLAIMS.length, after: ANGLE.length }) : [];
+  const answers = methods.length > 1 ? answerRows(methods, { before: PLACE.length, each, after: ANGLE.length }) : [];
   const corner = el("th", { scope: "col", rowSpan: 2 + answers.length, class: "name" }, "Corner");
   const gap = (width) => el("td", { colSpan: width });
   $("corner-table").tHead.replaceChildren(

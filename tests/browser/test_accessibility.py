@@ -1,5 +1,6 @@
 """Readable and usable: small screens, light and dark, and by those who do not see the page."""
 
+import re
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -91,6 +92,28 @@ def test_narrow_page_does_not_scroll_sideways(phone: Visitor) -> None:
             assert shown.evaluate("node => node.scrollWidth <= node.clientWidth"), panel
     assert phone.page.locator("#scene").bounding_box()["height"] > 180
     expect(phone.page.frame_locator("#scene").get_by_text("Connected")).to_be_hidden()
+
+
+def test_the_table_of_corners_fits_a_phone(phone: Visitor) -> None:
+    """Of one method with all its figures, of several with the areas, also once their answer is there."""
+    server, page = phone.server, phone.page
+    heads, groups = page.locator("#corner-table thead tr:last-child th"), page.locator("#corner-table .group")
+    fits = "node => node.scrollWidth <= node.clientWidth"
+    table = page.locator("#corners .table-scroll")
+    page.get_by_role("tab", name="Corners").tap()
+    expect(groups).to_have_count(1)
+    assert heads.all_inner_texts() == ["x", "y", "σx", "σy", "area", "angle"]
+    assert table.evaluate(fits)
+    server.patch("settings", {"view": {"compare": True}})
+    expect(groups).to_have_count(6)
+    assert heads.all_inner_texts() == ["x", "y", *6 * ["area"], "angle"]
+    assert table.evaluate(fits)
+    server.patch("settings", {"repeatability": {"running": True}})
+    expect(page.locator("#answer-coverage_95-ml")).to_have_text(re.compile(r"^\d+.%$"))
+    assert table.evaluate(fits)
+    server.pause()
+    page.set_viewport_size({"width": 844, "height": 390})
+    expect(heads).to_have_count(2 + 6 * 3 + 1)
 
 
 TWO_MESSAGES = """import('/static/js/toasts.js').then(({ toast }) => {
