@@ -21,7 +21,7 @@ from ..problems import ProblemError, documented
 from ..schemas import Pair
 from .dependencies import CurrentFrame
 
-router = APIRouter(prefix="/measure", tags=["frame"], responses=documented(404, 422))
+router = APIRouter(prefix="/measure", tags=["frame"], responses=documented(404, 422, 503))
 
 SNAP = 0.3  # m; what is farther away was not meant
 MIXED = "One place is of the scan, the other of the map: give two of the scan, or two of the map."
