@@ -1,60 +1,19 @@
-"""Recordings become maps one at a time, each in a process of its own, finished as `lidarcore map` finishes them."""
+"""Recordings become maps one after the other, each in a process of its own, as `lidarcore map` finishes them."""
 
 import threading
-import time
 from contextlib import suppress
-from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Literal
-from zipfile import ZIP_DEFLATED, ZipFile
 
 from lidarcore import LidarError
 from lidarcore.landmarks import MAX_NAME
 
-from ..errors import ConflictError, NotFoundError, storing
+from ..errors import ConflictError, NotFoundError
 from ..pipeline.settings import Settings
-from ..records import record
-from .command_process import CommandProcess
 from .landmark_store import LandmarkStore
+from .map_making import Making, MakingStatus
 
-State = Literal["running", "finished", "failed", "cancelled"]
-
-
-@dataclass(frozen=True, slots=True)
-class MakingStatus:
-    """`done` of `total` scans, null where nobody knows how many; once all are done the map is adjusted as a whole.
-
-    `session` is that of the map, once it is finished; `error` says why it failed.
-    """
-
-    recording: str
-    state: State
-    elapsed_s: float
-    done: int
-    total: int | None
-    session: int | None
-    error: str | None
-
-
-@dataclass(eq=False)
-class _Making:
-    """One map, from its start until another one is started."""
-
-    recording: str
-    total: int | None
-    folder: TemporaryDirectory[str]
-    state: State = "running"
-    session: int | None = None
-    error: str | None = None
-    started: float = field(default_factory=time.monotonic)
-    ended: float | None = None
-    process: CommandProcess | None = None
-
-    def status(self) -> MakingStatus:
-        elapsed = (self.ended or time.monotonic()) - self.started
-        done = self.process.done if self.process else 0
-        return record(MakingStatus, self, elapsed_s=round(elapsed, 1), done=done)
+MOST = 8  # that wait, and that have ended and are kept
 
 
 class MapMaker:
@@ -62,112 +21,107 @@ class MapMaker:
 
     def __init__(self, store: LandmarkStore) -> None:
         self._store = store
-        self._made: _Making | None = None
+        self._ids = count(1)
+        self._waiting: list[Making] = []
+        self._running: Making | None = None
+        self._ended: list[Making] = []
         self._lock = threading.Lock()
 
-    @property
-    def status(self) -> MakingStatus | None:
-        """Of the map that is made, or was made last; None at first."""
-        return self._made.status() if self._made else None
+    def status(self) -> tuple[MakingStatus | None, list[MakingStatus], list[MakingStatus]]:
+        """Of the map that is made, or else was made last; of those that wait; of those that have ended."""
+        with self._lock:
+            waiting, ended = ([making.status() for making in some] for some in (self._waiting, self._ended))
+            now = self._running.status() if self._running else ended[-1] if ended else None
+        return now, waiting, ended
 
-    @property
-    def files(self) -> Path:
-        """A zip of all files of the map that was made last. Raises NotFoundError if there is none."""
-        if self._made is None or self._made.state != "finished":
-            raise NotFoundError("No map of a recording is finished: make one first.")
-        return _files(self._made, self._made.session)
+    def files(self, id: int | None) -> tuple[Path, str]:
+        """A zip of all files of a map, of the last one if none is named, and its name. Raises NotFoundError."""
+        with self._lock:
+            finished = [one for one in self._ended if one.state == "finished" and id in (None, one.id)]
+        if not finished:
+            raise NotFoundError("No such map of a recording is finished: make one first.")
+        return finished[-1].files, f"map-{finished[-1].session}.zip"
 
     def start(self, path: Path, topic: str | None, scans: int | None, settings: Settings) -> MakingStatus:
         """Make a map of the recording at a path, of so many scans, with the settings of the sensor and of walls.
 
-        Raises ConflictError if one is made already, StorageError.
+        While another one is made it waits; otherwise what was made before is forgotten. Raises ConflictError if this
+        one is made or waits already, or too many wait, StorageError.
         """
         with self._lock:
-            if self._made and self._made.state == "running":
-                raise ConflictError(
-                    f"A map of {self._made.recording} is being made: wait for its end, or cancel it first."
-                )
-            self._forget()
-            with storing("No folder for the map can be made"):
-                folder = TemporaryDirectory(prefix="lidarcore-map-")
-                chosen = Path(folder.name) / "settings.json"
-                chosen.write_text(settings.model_dump_json(), "utf-8")
-            made = _Making(path.name, scans, folder)
-            wanted = [
-                f"--output={_output(made)}",
-                f"--settings={chosen}",
-                *([f"--topic={topic}"] if topic else []),
-            ]
-            made.process = CommandProcess(
-                ["map", str(path.absolute()), *wanted], lambda code, message: self._end(made, code, message)
-            )
-            self._made = made
-            return made.status()
+            self._check(path, topic)
+            making = Making.of(next(self._ids), path, topic, scans, settings)
+            if self._running is None:
+                self._forget(self._ended)
+            self._waiting.append(making)
+            self._go_on()
+            return making.status()
 
-    def cancel(self) -> None:
-        """End what is made, and its process. Raises NotFoundError if nothing is."""
+    def cancel(self, id: int | None = None) -> None:
+        """End what is made, and its process, or take one out that waits. Raises NotFoundError if there is none."""
         with self._lock:
-            made = self._made
-            if made is None or made.state != "running":
-                raise NotFoundError("No map of a recording is being made.")
-            made.state = "cancelled"
-        if made.process:
-            made.process.kill()
+            running = self._running if self._running and id in (None, self._running.id) else None
+            waiting = [making for making in self._waiting if making.id == id]
+            if running:
+                running.state = "cancelled"
+            elif waiting:
+                self._waiting.remove(*waiting)
+            else:
+                raise NotFoundError("No such map of a recording is being made, or waits.")
+        self._forget(waiting)
+        if running and running.process:
+            running.process.kill()
 
     def close(self) -> None:
-        """End what is made, and remove its files."""
+        """End what is made and what waits, and remove all files."""
+        with self._lock:
+            self._forget(self._waiting)
         with suppress(NotFoundError):
             self.cancel()
-        self._forget()
+        self._forget(self._ended)
 
-    def _forget(self) -> None:
-        if self._made:
-            self._made.folder.cleanup()
+    def _check(self, path: Path, topic: str | None) -> None:
+        busy = [self._running, *self._waiting]
+        if any(one is not None and (one.path, one.topic) == (path, topic) for one in busy):
+            raise ConflictError(f"A map of {path.name} is being made, or waits: cancel it first.")
+        if len(self._waiting) >= MOST:
+            raise ConflictError(f"{MOST} maps wait already: wait for the end of one, or cancel one.")
 
-    def _end(self, made: _Making, code: int, message: str) -> None:
-        """Keep the map whose process has ended well."""
-        session, error = self._kept(made) if code == 0 and made.state == "running" else (None, message)
+    def _go_on(self) -> None:
+        """Begin the next one, if none is made."""
+        if self._running is None and self._waiting:
+            making = self._waiting.pop(0)
+            making.begin(lambda code, message: self._end(making, code, message))
+            self._running = making  # not if it could not be begun
+
+    def _end(self, making: Making, code: int, message: str) -> None:
+        """Keep the map whose process has ended well, and go on."""
+        session, error = self._kept(making) if code == 0 and making.state == "running" else (None, message)
         with self._lock:
-            made.ended = time.monotonic()
-            if made.state == "running":
-                made.session, made.error = session, error
-                made.state = "failed" if session is None else "finished"
-            elif session is not None:  # cancelled at the last moment
+            making.end(session, error)
+            if session is not None and making.state != "finished":  # cancelled at the last moment
                 self._store.atlas.delete(session)
-            if made.state != "finished":
-                made.folder.cleanup()
+            self._ended.append(making)
+            self._forget(self._ended, MOST)
+            self._running = None
+            self._go_on()
 
-    def _kept(self, made: _Making) -> tuple[int | None, str | None]:
+    def _kept(self, making: Making) -> tuple[int | None, str | None]:
         """The session that a map has become, or why it has not."""
         try:
-            packed = _packed(made)
-            named = _name_of(made.recording)
-            session = self._store.load(packed, "zip", made.recording, mode="slam", name=named).id
-            with storing("The files cannot be named"):
-                packed.rename(_files(made, session))
-            return session, None
+            packed, named = making.packed(), _name_of(making.recording)
+            return self._store.load(packed, "zip", making.recording, mode="slam", name=named).id, None
         except LidarError as error:
             return None, str(error)
+
+    @staticmethod
+    def _forget(some: list[Making], but: int = 0) -> None:
+        """Remove the first ones with their files, but for so many."""
+        while len(some) > but:
+            some.pop(0).forget()
 
 
 def _name_of(recording: str) -> str:
     """What the map of a recording is called until somebody renames it."""
     name = Path(recording).stem[:MAX_NAME]
     return name if name.isprintable() else ""
-
-
-def _output(made: _Making) -> Path:
-    return Path(made.folder.name) / "map"
-
-
-def _files(made: _Making, session: int | None) -> Path:
-    return Path(made.folder.name) / f"map-{session}.zip"
-
-
-def _packed(made: _Making) -> Path:
-    """All files of a map in one. Raises StorageError."""
-    path = _files(made, None)
-    with storing("The map cannot be packed"), ZipFile(path, "w", ZIP_DEFLATED) as archive:
-        for file in sorted(_output(made).iterdir()):
-            archive.write(file, file.name)
-    return path

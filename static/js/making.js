@@ -1,8 +1,9 @@
-// A finished map of a whole recording, made by the server beside what plays: how far it is, and what came of it.
+// Finished maps of whole recordings, made by the server beside what plays, one after the other: how far the one is that
+// is made, which ones wait, and what came of those before.
 
 import { address, Problem, request } from "./api.js";
 import { attempt } from "./actions.js";
-import { $, el, remake, setText } from "./dom.js";
+import { $, el, iconButton, remake, setText } from "./dom.js";
 import { localizeIn } from "./maps.js";
 import { get, on, set } from "./store.js";
 import { report, toast } from "./toasts.js";
@@ -19,12 +20,17 @@ const progress = el(
   { id: "making-progress", class: "job", hidden: true },
   bar,
   text,
-  el("button", { type: "button", class: "button", onclick: cancel }, "Cancel"),
+  el("button", { type: "button", class: "button", onclick: () => cancel(get("making").making.id) }, "Cancel"),
 );
+const queue = el("ul", { id: "making-queue", class: "entries" });
+
+/** What the store has as "making": as the server tells, with the session of the map that was finished last. */
+const known = (found) => ({ ...found, session: found.ended.findLast(isFinished)?.session ?? null });
+const isFinished = ({ state }) => state === "finished";
 
 export function mountMaking() {
-  set("making", null);
-  $("library-list").before(progress, el("div", { id: "made" }));
+  set("making", known({ making: null, waiting: [], ended: [] }));
+  $("library-list").before(progress, queue, el("div", { id: "made" }));
   on(["making"], draw);
   on(["connection"], (connection) => connection === "open" && ask());
 }
@@ -34,7 +40,7 @@ export async function makeMap(recording, topic = undefined) {
   try {
     await request("POST", STATUS, { recording, ...(topic && { topic }) });
     await ask();
-    requestAnimationFrame(() => progress.scrollIntoView({ block: "nearest" })); // drawn by then
+    requestAnimationFrame(() => (queue.lastElementChild ?? progress).scrollIntoView({ block: "nearest" })); // drawn by then
   } catch (problem) {
     const topics = problem instanceof Problem && problem.members.topics;
     if (!topics?.length) return report(problem, "The map could not be made");
@@ -43,8 +49,8 @@ export async function makeMap(recording, topic = undefined) {
   }
 }
 
-async function cancel() {
-  await attempt(() => request("DELETE", STATUS), "The map could not be cancelled");
+async function cancel(id) {
+  await attempt(() => request("DELETE", `${STATUS}?id=${id}`), "The map could not be cancelled");
   await ask();
 }
 
@@ -53,13 +59,17 @@ let timer = 0;
 /** Asks how far it is, again and again while it runs, whoever began it. */
 async function ask() {
   clearTimeout(timer);
-  const before = get("making");
-  const found = (await request("GET", STATUS).catch(() => null))?.making ?? null;
-  set("making", found);
+  const found = await request("GET", STATUS).catch(() => null);
   clearTimeout(timer); // of a question that was asked meanwhile
-  if (found?.state === "running") timer = setTimeout(ask, ASK_MS);
-  else if (before?.state === "running" && found?.state === "finished") tell(found);
+  if (!found) return;
+  const before = get("making");
+  set("making", known(found));
+  if (isRunning(found)) timer = setTimeout(ask, ASK_MS);
+  const isNew = ({ id }) => before.making && !before.ended.some((one) => one.id === id);
+  found.ended.filter((one) => isFinished(one) && isNew(one)).forEach(tell);
 }
+
+const isRunning = ({ making }) => making?.state === "running";
 
 function tell({ recording, session }) {
   toast(`Made of all scans of ${recording}.`, {
@@ -68,16 +78,24 @@ function tell({ recording, session }) {
   });
 }
 
-function draw(making) {
-  const isRunning = making?.state === "running";
-  progress.hidden = !isRunning;
-  if (isRunning) {
+function draw(found) {
+  const { making, waiting, ended } = found;
+  progress.hidden = !isRunning(found);
+  if (isRunning(found)) {
     const { done, total } = making;
     if (total) bar.value = Math.min(done / total, 1);
     else bar.removeAttribute("value");
     setText(text, progressText(making));
   }
-  remake($("made"), [making && { ...making, done: 0, elapsed_s: isRunning || making.elapsed_s }], () => outcome(making));
+  queue.hidden = !waiting.length;
+  remake(queue, waiting, () => waiting.map(waitingLine));
+  remake($("made"), ended, () => ended.flatMap(outcome));
+}
+
+function waitingLine({ id, recording }) {
+  const name = `Do not make the map of ${recording}`;
+  const line = el("p", { class: "entry" }, el("span", {}, `Map of ${recording}: waiting`));
+  return el("li", {}, line, iconButton("close", name, () => cancel(id)));
 }
 
 function progressText({ recording, done, total }) {
@@ -85,10 +103,10 @@ function progressText({ recording, done, total }) {
   return `Map of ${recording}: ${wholeNumber(done)}${total ? ` of ${wholeNumber(total)}` : ""} scans`;
 }
 
-function outcome(making) {
-  if (making?.state === "failed") return [el("p", { class: "fault", role: "alert" }, `No map of ${making.recording}: ${making.error}`)];
-  if (making?.state !== "finished") return [];
-  const { recording, session, elapsed_s: took } = making;
-  const files = el("a", { href: address(`${STATUS}/files`).href, download: `map-${session}.zip` }, "Save all files, with the poses");
+function outcome({ id, recording, state, session, error, elapsed_s: took }) {
+  if (state === "failed") return [el("p", { class: "fault", role: "alert" }, `No map of ${recording}: ${error}`)];
+  if (state !== "finished") return [];
+  const href = address(`${STATUS}/files?id=${id}`).href;
+  const files = el("a", { href, download: `map-${session}.zip` }, "Save all files, with the poses");
   return [el("p", { class: "muted" }, `Map ${session} of ${recording}, made in ${duration(took)}. `, files)];
 }

@@ -4,7 +4,7 @@ from typing import Any
 import httpx
 import pytest
 from lidarcore_app.jobs.calibration import CalibrationStatus
-from lidarcore_app.jobs.map_maker import MakingStatus
+from lidarcore_app.jobs.map_making import MakingStatus
 from lidarcore_app.jobs.profiles import Profile, ProfileEntry
 from lidarcore_app.jobs.recorder import RecorderStatus
 from lidarcore_app.jobs.studies import StudyStatus

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
 from zipfile import ZipFile
@@ -93,6 +94,61 @@ def test_a_map_that_is_cancelled_is_gone_with_its_process(server: Server) -> Non
     assert "make one first" in assert_problem(server.http.get(f"{MAKING}/files"), 404)["detail"]
     server.app.state.server.map_maker.close()
     assert not folder.parent.exists()
+
+
+def test_maps_wait_for_each_other_and_can_be_cancelled_meanwhile(server: Server) -> None:
+    drive(server.folder / "drive.mcap", 60)
+    names = [f"copy-{number}.mcap" for number in range(10)]
+    for name in names:
+        (server.folder / name).write_bytes((server.folder / "drive.mcap").read_bytes())
+    begun = [server.change("POST", MAKING, {"recording": name}) for name in names[:9]]
+    assert [one["state"] for one in begun] == ["running", *8 * ["waiting"]]
+    assert (
+        "8 maps wait" in assert_problem(server.http.post(MAKING, json={"recording": names[9]}), 409)["detail"]
+    )
+    again = assert_problem(server.http.post(MAKING, json={"recording": names[3]}), 409)
+    assert f"{names[3]} is being made, or waits" in again["detail"]
+    first, *others = (one["id"] for one in begun)
+    for id in others[1:]:
+        assert server.http.delete(MAKING, params={"id": id}).status_code == 204
+        assert_problem(server.http.delete(MAKING, params={"id": id}), 404)
+    found = server.get(MAKING)
+    assert found["making"]["id"] == first
+    assert [(one["id"], one["state"], one["elapsed_s"]) for one in found["waiting"]] == [
+        (others[0], "waiting", 0.0)
+    ]
+
+    wait_until(lambda: len(server.get(MAKING)["ended"]) == 2, "both are made", LONGEST)
+    found = server.get(MAKING)
+    assert [(one["id"], one["recording"], one["state"]) for one in found["ended"]] == [
+        (first, names[0], "finished"),
+        (others[0], names[1], "finished"),
+    ]
+    assert found["making"] == found["ended"][-1]
+    assert found["waiting"] == []
+    sessions = [one["session"] for one in found["ended"]]
+    assert [one["id"] for one in server.get("/sessions")["sessions"]] == sessions
+    for one in found["ended"]:  # also of the one that was not made last
+        answer = server.http.get(f"{MAKING}/files", params={"id": one["id"]}).raise_for_status()
+        assert f"map-{one['session']}.zip" in answer.headers["content-disposition"]
+        with ZipFile(io.BytesIO(answer.content)) as archive:
+            assert len(archive.read("poses.csv").splitlines()) == 61
+
+
+def test_the_end_of_a_server_ends_what_is_made_and_what_waits(make_server: Callable[..., Server]) -> None:
+    server = make_server()
+    for name in ("one.mcap", "two.mcap", "three.mcap"):
+        drive(server.folder / name, 60)
+        server.change("POST", MAKING, {"recording": name})
+    wait_until(lambda: makers(server), "a process runs")
+    maker = server.app.state.server.map_maker
+    folders = [Path(one.folder.name) for one in (maker._running, *maker._waiting)]
+    assert all(folder.is_dir() for folder in folders)
+    maker.close()
+    assert not makers(server)
+    assert not any(folder.exists() for folder in folders)
+    assert server.get(MAKING)["waiting"] == []
+    assert server.get("/sessions")["sessions"] == []
 
 
 def test_what_cannot_be_mapped_is_refused_with_the_reason(server: Server) -> None:

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from zipfile import ZipFile
 
 import pytest
-from browsing import Server, Visitor
+from browsing import ROOT, Server, Visitor
 from playwright.sync_api import expect
 from waiting import wait_until
 
-DEMO = "emulated-s1.mcap"
+DEMO, WINDSOR, COPY = "emulated-s1.mcap", "real-rplidar-windsor.npz", "copy.npz"
 CORNER = {"x": 1, "y": 2, "var_x": 1e-4, "cov_xy": 0, "var_y": 1e-4, "kind": "corner"}
 MAP = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [CORNER]}
 
@@ -101,6 +101,27 @@ def test_a_name_that_is_being_typed_stays_when_another_map_comes(visitor: Visito
     expect(page.get_by_title(f"Localize in map {id + 1}")).to_be_visible()
     for one in (id, id + 1):
         server.api.delete(f"sessions/{one}").raise_for_status()
+
+
+def test_a_second_map_waits_for_the_first_one_and_can_be_given_up(visitor: Visitor) -> None:
+    page, server = visitor.page, visitor.server
+    (server.folder / COPY).write_bytes((ROOT / "app" / "demo" / WINDSOR).read_bytes())
+    page.get_by_role("tab", name="Source").click()
+    queue = page.locator("#making-queue li")
+    for number, recording in enumerate((DEMO, WINDSOR, COPY)):
+        page.get_by_role("button", name=f"Make a map of {recording}").click()
+        expect(queue).to_have_count(number)
+    expect(page.locator("#making-progress output")).to_contain_text(f"Map of {DEMO}")
+    expect(queue).to_have_text([f"Map of {WINDSOR}: waiting", f"Map of {COPY}: waiting"])
+    expect(queue.last).to_be_in_viewport()
+    page.get_by_role("button", name=f"Do not make the map of {WINDSOR}").click()
+    expect(queue).to_have_text([f"Map of {COPY}: waiting"])
+    page.locator("#making-progress").get_by_role("button", name="Cancel").click()
+    expect(page.locator("#making-progress output")).to_contain_text(f"Map of {COPY}")
+    expect(queue).to_have_count(0)
+    page.locator("#making-progress").get_by_role("button", name="Cancel").click()
+    expect(page.locator("#making-progress")).to_be_hidden()
+    assert [one["state"] for one in server.get("map/making")["ended"]] == ["cancelled", "cancelled"]
 
 
 def test_a_map_that_takes_too_long_is_cancelled(visitor: Visitor) -> None:

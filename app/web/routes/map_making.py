@@ -2,14 +2,14 @@
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Body
+from fastapi import APIRouter, Body, Query
 from pydantic import Field
 from starlette.responses import FileResponse
 from typing_extensions import TypedDict
 
 from lidarcore import RecordingError, TopicError
 
-from ...jobs.map_maker import MakingStatus
+from ...jobs.map_making import MakingStatus
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import Server
@@ -18,9 +18,14 @@ router = APIRouter(prefix="/map/making", tags=["landmarks"])
 
 
 class MakingJson(TypedDict):
+    """`making` is made, or was made last; `waiting` come next, in their order; `ended`, the last one last, are kept."""
+
     making: MakingStatus | None
+    waiting: list[MakingStatus]
+    ended: list[MakingStatus]
 
 
+Id = Annotated[int | None, Query(description="of one that POST has answered with")]
 ZIP: dict[int | str, dict[str, Any]] = {200: {"description": "The files", "content": {"application/zip": {}}}}
 
 
@@ -31,14 +36,15 @@ class WantedMap(StrictBody):
     topic: Annotated[str | None, Field(max_length=200)] = None
 
 
-@router.post("", response_description="What is made now", responses=documented(404, 409, 422, 507))
+@router.post("", response_description="What is made, or waits", responses=documented(404, 409, 422, 507))
 def start(
     server: Server, wanted: Annotated[WantedMap, Body(examples=[{"recording": "hall.mcap"}])]
 ) -> MakingStatus:
     """Make a map of a whole recording, as `lidarcore map` does, with the noise, walls and mask that are set now.
 
     Loops are sought once more and all scans adjusted at once when it is finished, which no map that grows beside the
-    sensor is. It becomes a session, as other maps do. One at a time, in a process of its own that gives way to others.
+    sensor is. It becomes a session, as other maps do. One at a time, in a process of its own that gives way to others:
+    up to 8 wait meanwhile. What was made before is forgotten when one begins and none waited; the maps stay.
     """
     path = server.library.path(wanted.recording)
     facts = server.library.facts(wanted.recording)
@@ -47,16 +53,17 @@ def start(
     return server.map_maker.start(path, wanted.topic, facts.scans, server.runtime.settings)
 
 
-@router.get("", response_description="What is made, or was made last")
+@router.get("", response_description="What is made, or was made last, and what waits")
 def read(server: Server) -> MakingJson:
     """How far the map of a recording is; null if none was made since the server started."""
-    return {"making": server.map_maker.status}
+    making, waiting, ended = server.map_maker.status()
+    return {"making": making, "waiting": waiting, "ended": ended}
 
 
 @router.delete("", status_code=204, responses=documented(404))
-def cancel(server: Server) -> None:
-    """Make that map no further; nothing of it stays."""
-    server.map_maker.cancel()
+def cancel(server: Server, id: Id = None) -> None:
+    """Make that map no further, the one that is made if no id is given; nothing of it stays, and the next begins."""
+    server.map_maker.cancel(id)
 
 
 @router.get(
@@ -64,7 +71,10 @@ def cancel(server: Server) -> None:
     response_class=FileResponse,
     responses=ZIP | documented(404),
 )
-def files(server: Server) -> FileResponse:
-    """All files of the map that was made last: what /map gives as zip, and poses.csv with covariances, of all scans."""
-    found = server.map_maker.files
-    return FileResponse(found, media_type="application/zip", filename=found.name)
+def files(server: Server, id: Id = None) -> FileResponse:
+    """All files of the map that was made last, or of another: what /map gives as zip, and poses.csv of all scans.
+
+    The poses have covariances.
+    """
+    path, name = server.map_maker.files(id)
+    return FileResponse(path, media_type="application/zip", filename=name)
