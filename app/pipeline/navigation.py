@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 from numpy.typing import ArrayLike
 
@@ -11,7 +11,7 @@ from lidarcore import Array, Features, Scan
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LandmarkMapError
 from lidarcore.geometry import check_covariance
-from lidarcore.localization import Landmarks, Navigator, as_pose
+from lidarcore.localization import Navigator, as_pose
 from lidarcore.mapping import MapPicture, WholeScans
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
@@ -19,58 +19,20 @@ from lidarcore.mapping.walls import WallTable
 from ..errors import ConflictError
 from ..sources.odometry_feed import OdometryFeed, OdometryStatus
 from ..sources.timed_scan import TimedScan
+from .map_store import MapStore
 from .settings import LiveNavigation, Method, Settings
-from .slam_run import Localization, MapRun, Run
+from .slam_run import Localization, Run
 from .trails import NO_PATHS, Paths, TrackedPose, Trails
 
 SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
 Extent = tuple[tuple[float, float], tuple[float, float]]
+
 NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
-
-
 NOT_MOVED = (
     "A map of whole scans begins where its first scan was taken: POST /localization/reset starts a new map. "
     'To place the sensor, set navigation.method to "landmarks".'
 )
 NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."
-
-
-class WallRun(Protocol):
-    """Where grid and walls of one run are kept."""
-
-    def put(self, grid: OccupancyGrid, walls: WallTable) -> None:
-        """Keep them as they are now; returns at once."""
-
-
-class MapStore(Protocol):
-    """Where maps are kept, each in a session of its own."""
-
-    def begin(self, source: str, *, replay: Hashable) -> MapRun:
-        """An empty map, to be built; in place of the last one with that `replay`, unless it is None."""
-
-    def begin_walls(self, source: str, *, replay: Hashable) -> WallRun:
-        """An empty map of walls, to be built; in place of the last one with that `replay`, unless it is None."""
-
-    def use(self, session: int | None) -> None:
-        """No map is built any more; that of a session is used, if one is given."""
-
-    def settle(self) -> None:
-        """What was built until now is kept when this returns."""
-
-    def newest(self) -> int | None:
-        """The newest session to localize in."""
-
-    def grid(self, session: int) -> OccupancyGrid | None:
-        """The grid of a session, if it has one. Raises LandmarkMapError."""
-
-    def walls(self, session: int) -> WallTable:
-        """The walls that a session has, if any. Raises UnknownSessionError."""
-
-    def landmarks(self, session: int) -> Landmarks:
-        """The map of a session. Raises UnknownSessionError."""
-
-    def is_built(self, session: int) -> bool:
-        """Whether SLAM built that map, in a frame of its own. Raises UnknownSessionError."""
 
 
 @dataclass(frozen=True, slots=True)

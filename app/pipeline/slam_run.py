@@ -4,14 +4,14 @@ import time
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 from lidarcore import Array, ExtractionSettings, Features, Scan
 from lidarcore.clusters import Clusters
-from lidarcore.localization import Landmarks, NavigationSettings, Navigator, TrackingResult, Velocity, deskew
+from lidarcore.localization import NavigationSettings, Navigator, TrackingResult, Velocity, deskew
 from lidarcore.mapping import MapPicture, WholeScans
 
 from ..sources.timed_scan import TimedScan
+from .map_store import MapRun
 from .trails import Paths, Trails, thinned
 
 REMEMBERED = 3000  # scans whose localization is shown again when they are
@@ -32,21 +32,6 @@ class Localization:
     truth: Array | None
     motion: Velocity | None
     took_us: float | None
-
-
-class MapRun(Protocol):
-    """Where the map of one run is kept; every method returns at once."""
-
-    @property
-    def session(self) -> int | None:
-        """The session of the map; None until it holds a landmark."""
-
-    @property
-    def ids(self) -> Mapping[int, int]:
-        """Ids of the kept landmarks by those of the navigator."""
-
-    def put(self, landmarks: Landmarks, method: str) -> None:
-        """Keep the map as it is now; `method` is what found its landmarks."""
 
 
 @dataclass(slots=True, eq=False)
