@@ -5,7 +5,7 @@ import { answerRows, drawAnswer } from "./answer.js";
 import { $, el, setText, swatch } from "./dom.js";
 import { selectableRows } from "./rows.js";
 import { select } from "./actions.js";
-import { get, on } from "./store.js";
+import { get, on, set } from "./store.js";
 import { degrees, metres, millimetres, squareMillimetres, UNKNOWN } from "./units.js";
 
 const PLACE = [
@@ -22,7 +22,7 @@ const ANGLE = [{ key: "angle", label: "angle", unit: "°", text: degrees }];
 const NARROW = matchMedia("(max-width: 479px)");
 
 /** What each method claims: of several, a phone has room for the areas. */
-const claimsOf = (methods) => (NARROW.matches && methods.length > 1 ? AREA : [...SIGMAS, ...AREA]);
+const claimsOf = (methods) => (get("narrow") && methods.length > 1 ? AREA : [...SIGMAS, ...AREA]);
 
 /** The columns: {method, quantity}; where a corner is and its angle are told once, by the first method that has it. */
 const columnsFor = (methods) => [
@@ -42,15 +42,11 @@ export function mountCorners() {
     fill,
     choose: (corner) => select({ corner }),
   });
-  on(["frame", "methods"], draw);
+  set("narrow", NARROW.matches);
+  NARROW.addEventListener("change", () => set("narrow", NARROW.matches));
+  on(["frame", "methods", "narrow"], draw);
   on(["selection"], ({ corner }) => rows.mark(corner));
-  on(["frame", "repeatability"], drawAnswer);
-  NARROW.addEventListener("change", () => {
-    const frame = get("frame");
-    if (!frame) return;
-    draw(frame, get("methods"));
-    drawAnswer(frame, get("repeatability"));
-  });
+  on(["frame", "repeatability", "narrow"], drawAnswer);
 }
 
 /** Selects the corner `by` rows further; the first or last one if none is selected. */
@@ -64,13 +60,13 @@ function draw({ methods, corners }, known) {
   $("corner-none").hidden = corners.length > 0;
 }
 
-const keyOf = (methods) => [NARROW.matches, ...methods].join();
+const keyOf = (methods) => [get("narrow"), ...methods].join();
 
 function makeHead(methods, known) {
   columns = keyOf(methods);
   rows.update([]);
   const each = claimsOf(methods).length;
-  $("corner-table").classList.toggle("dense", NARROW.matches || methods.length > DENSE);
+  $("corner-table").classList.toggle("dense", get("narrow") || methods.length > DENSE);
   const titles = new Map(known.map(({ name, title }) => [name, title]));
   const groups = methods.map((name) => {
     const title = titles.get(name) ?? name;

@@ -17,7 +17,7 @@ import numpy as np
 import psutil
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Page, expect
+from playwright.sync_api import ConsoleMessage, Page, expect
 from waiting import PATIENCE, free_port, wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -139,6 +139,11 @@ class Server:
         wait_until(lambda: self.get("source")["device"]["state"] == "streaming", "the emulator streams")
 
 
+def _told(message: ConsoleMessage) -> str:
+    """What a message of the console says, and of which address."""
+    return f"{message.text} {message.location['url']}"
+
+
 class Visitor:
     """A page, everything it asked for, and every error it logged."""
 
@@ -150,7 +155,7 @@ class Visitor:
         page.on("request", lambda request: self.asked.append(request.url))
         page.on("websocket", lambda websocket: self.asked.append(websocket.url))
         page.on("pageerror", lambda error: self.errors.append(str(error)))
-        page.on("console", lambda message: message.type == "error" and self.errors.append(message.text))
+        page.on("console", lambda message: message.type == "error" and self.errors.append(_told(message)))
 
     def open(self, hash: str = "") -> "Visitor":
         """Go there; the page has a frame, all its controls, and has done what the link asks for."""
