@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lidarcore.geometry import compose, relative
+from lidarcore.geometry import act, compose, relative
 from lidarcore.mapping import LoopSettings, PoseGraph
 from lidarcore.mapping.loops.hypotheses import Hypotheses
 from lidarcore.mapping.loops.keyframes import Keyframe
@@ -92,3 +92,15 @@ def test_doors_that_are_alike_are_rivals_of_each_other(off):
     assert len(found) >= 3
     np.testing.assert_allclose(found / PITCH, np.round(found / PITCH), atol=0.05)
     assert len(set(np.round(found / PITCH))) == len(found)
+
+
+def test_what_nodes_saw_together_is_what_each_saw_seen_from_one_of_them():
+    """But for what says how walls lie, and nothing of where they are seen."""
+    truth, graph, keyframes = newest_on_first(FURNISHED, 0.0)
+    nodes = np.array([30, 31, 35])
+    seen = Passes(graph, keyframes, LOOPS, MATCH.reach).seen(32, nodes)
+    assert any((keyframes[node].patches.counts == 0).any() for node in nodes)
+    near = [keyframes[node].patches.near for node in nodes]
+    in_map = [act(truth[node], one.means) for node, one in zip(nodes, near, strict=True)]
+    np.testing.assert_allclose(act(truth[32], seen.means), np.concatenate(in_map), atol=1e-9)
+    np.testing.assert_array_equal(seen.counts, np.concatenate([one.counts for one in near]))

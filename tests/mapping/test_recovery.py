@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array, diags_array, random_array
 
 from lidarcore.geometry import compose, relative
 from lidarcore.mapping import PoseGraph
+from lidarcore.mapping.graph.recovery import factor, selected_inverse
 
 CORRELATED = np.array([[4, 1, 0.5], [1, 3, -0.2], [0.5, -0.2, 1]]) * 1e-4
 PLAIN = np.diag([4e-4, 3e-4, 1e-4])  # some entries of the factor are exactly 0, and not kept
@@ -72,6 +74,21 @@ def test_nodes_that_are_appended_one_by_one_have_the_covariance_that_a_new_facto
     J = np.hstack([A, B])
     expected = J @ joint[np.ix_(both, both)] @ J.T
     np.testing.assert_allclose(graph.relative(40, len(graph) - 2).covariance, expected, rtol=1e-4, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_blocks_of_the_inverse_are_those_of_the_dense_one_or_not_given_whatever_the_pattern(seed):
+    rng = np.random.default_rng(seed)
+    half = random_array((60, 60), density=0.02, rng=rng) + diags_array(rng.uniform(0.5, 1, 60))
+    H = csc_array(half @ half.T)
+    found = factor(H)
+    L, pivots = found.L, found.U.diagonal()
+    own = selected_inverse(L.indptr, L.indices, L.data, pivots, found.perm_r)
+    inverse = np.linalg.inv(H.toarray())
+    expected = np.array([inverse[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(20)])
+    given = np.isfinite(own)
+    assert given[:, range(3), range(3)].mean() > 0.5
+    np.testing.assert_allclose(own[given], expected[given], rtol=1e-6, atol=1e-9)
 
 
 def _jacobian(a, b):
