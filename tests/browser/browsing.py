@@ -117,11 +117,12 @@ class Server:
             self.api.post("emulator", json={"command": command}).raise_for_status()
 
     def reset(self) -> None:
-        """As after its start: the emulator plays, settings are the defaults, the folder is empty."""
+        """As after its start: the emulator plays, settings are the defaults, the folder is empty, no scan is judged."""
         self.api.post("recorder/stop")
         self.api.put("selection", json={"corner": None, "landmark": None}).raise_for_status()
         groups = ("sensor", "extraction", "clusters", "navigation", "view", "repeatability")
         self.patch("settings", dict.fromkeys(groups))
+        self.api.delete("repeatability").raise_for_status()
         self.emulate()
         for recording in self.get("recordings")["recordings"]:
             if not recording["builtin"]:
