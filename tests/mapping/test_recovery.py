@@ -6,7 +6,7 @@ from scipy.sparse import csc_array, diags_array, random_array
 
 from lidarcore.geometry import compose, relative
 from lidarcore.mapping import PoseGraph
-from lidarcore.mapping.graph.recovery import factor, selected_inverse
+from lidarcore.mapping.graph.recovery import columns_of_inverse, factor, selected_inverse
 
 CORRELATED = np.array([[4, 1, 0.5], [1, 3, -0.2], [0.5, -0.2, 1]]) * 1e-4
 PLAIN = np.diag([4e-4, 3e-4, 1e-4])  # some entries of the factor are exactly 0, and not kept
@@ -83,8 +83,11 @@ def test_blocks_of_the_inverse_are_those_of_the_dense_one_or_not_given_whatever_
     H = csc_array(half @ half.T)
     found = factor(H)
     L, pivots = found.L, found.U.diagonal()
-    own = selected_inverse(L.indptr, L.indices, L.data, pivots, found.perm_r)
+    parts = L.indptr, L.indices, L.data, pivots, found.perm_r
+    own = selected_inverse(*parts)
     inverse = np.linalg.inv(H.toarray())
+    columns = np.hstack([columns_of_inverse(*parts, 3 * k) for k in range(20)])
+    np.testing.assert_allclose(columns, inverse, rtol=1e-6, atol=1e-9)
     expected = np.array([inverse[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] for k in range(20)])
     given = np.isfinite(own)
     assert given[:, range(3), range(3)].mean() > 0.5

@@ -23,6 +23,7 @@ class Recovery:
     def __init__(self, factor: SuperLU) -> None:
         self._factor = factor
         self._count = int(factor.shape[0]) // 3  # of the nodes that the factor knows
+        self._triangular: tuple[Ints, Ints, Array, Array, Ints] | None = None
         self._own: Array | None = None
         self._columns: dict[int, Array] = {}
         # Of each node after those of the factor: how it moves with the factor's last one, and its own covariance.
@@ -81,8 +82,7 @@ class Recovery:
     @property
     def _diagonal(self) -> Array:
         if self._own is None:
-            L, pivots = self._factor.L, self._factor.U.diagonal()
-            self._own = selected_inverse(L.indptr, L.indices, L.data, pivots, self._factor.perm_r)
+            self._own = selected_inverse(*self._parts)
             for k in np.flatnonzero(np.isnan(self._own).any(axis=(1, 2))).tolist():
                 self._own[k] = self._solved(k)[3 * k : 3 * k + 3]
         return self._own
@@ -95,10 +95,16 @@ class Recovery:
         return self._columns[j]
 
     def _solved(self, j: int) -> Array:
-        unit = np.zeros((self._factor.shape[0], 3))
-        unit[3 * j : 3 * j + 3] = np.eye(3)
-        solved: Array = self._factor.solve(unit)
-        return solved
+        """(3 N, 3) covariances of all nodes with one."""
+        return columns_of_inverse(*self._parts, 3 * j)
+
+    @property
+    def _parts(self) -> tuple[Ints, Ints, Array, Array, Ints]:
+        """The factor, as the kernels take it: taking it apart costs more than solving for a column."""
+        if self._triangular is None:
+            L, pivots = self._factor.L, self._factor.U.diagonal()
+            self._triangular = L.indptr, L.indices, L.data, pivots, self._factor.perm_r
+        return self._triangular
 
 
 def factor(H: csc_array) -> SuperLU:
@@ -142,6 +148,35 @@ def selected_inverse(begins: Ints, rows: Ints, lower: Array, pivots: Array, orde
                 inverse[e] = shared[at, k] if at < m else own[at - m, k]
         place[last], place[first:end] = -1, -1
     return _blocks(begins, rows, inverse, order)
+
+
+@kernel
+def columns_of_inverse(
+    begins: Ints, rows: Ints, lower: Array, pivots: Array, order: Ints, first: int
+) -> Array:
+    """Three columns (3 N, 3) of the inverse of the same matrix, from the first one on."""
+    solved = np.zeros((len(pivots), 3))
+    for m in range(3):
+        solved[order[first + m], m] = 1.0
+    for j in range(order[first : first + 3].min(), len(pivots)):
+        a, b, c = solved[j]
+        if a == b == c == 0.0:
+            continue
+        for e in range(begins[j], begins[j + 1]):
+            if rows[e] != j:
+                solved[rows[e], 0] -= lower[e] * a
+                solved[rows[e], 1] -= lower[e] * b
+                solved[rows[e], 2] -= lower[e] * c
+    solved /= pivots.reshape(-1, 1)
+    for j in range(len(pivots) - 1, -1, -1):
+        a, b, c = solved[j]
+        for e in range(begins[j], begins[j + 1]):
+            if rows[e] != j:
+                a -= lower[e] * solved[rows[e], 0]
+                b -= lower[e] * solved[rows[e], 1]
+                c -= lower[e] * solved[rows[e], 2]
+        solved[j, 0], solved[j, 1], solved[j, 2] = a, b, c
+    return solved[order]
 
 
 @kernel
