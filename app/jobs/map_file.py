@@ -48,15 +48,19 @@ def building_of(path: Path) -> Building:
 
     Raises MapFileError or GridError.
     """
-    with closing(Isolated("the map", MapFileError, _read_building, path)) as reading:
+    with (
+        tempfile.TemporaryDirectory(
+            prefix="lidarcore-map-"
+        ) as folder,  # the process that reads may be killed
+        closing(Isolated("the map", MapFileError, _read_building, path, Path(folder))) as reading,
+    ):
         return next(iter(reading))
 
 
-def _read_building(path: Path) -> Iterator[Building]:
-    with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder:
-        yaml = _unpacked(path, Path(folder))
-        walls = yaml.with_name(_WALLS)
-        yield Building(read_ros_map(yaml), read_walls_csv(walls) if walls.is_file() else None)
+def _read_building(path: Path, folder: Path) -> Iterator[Building]:
+    yaml = _unpacked(path, folder)
+    walls = yaml.with_name(_WALLS)
+    yield Building(read_ros_map(yaml), read_walls_csv(walls) if walls.is_file() else None)
 
 
 def _unpacked(path: Path, folder: Path) -> Path:

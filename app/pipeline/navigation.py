@@ -123,6 +123,12 @@ class Navigation:
             if self._run and self._run.known is not None:
                 self._drop_run()
 
+    def leave_map(self, session: int) -> None:
+        """The map of a session is gone: whoever is localized in it is so no longer."""
+        with self._lock:
+            if self._run and self._run.known == session:
+                self._drop_run()
+
     def reset(self) -> None:
         """Start over: SLAM with an empty map, localization from nothing."""
         with self._lock:

@@ -21,6 +21,7 @@ _SESSIONS = """SELECT id, source, mode, started, ended,
 
 MAX_NAME = 200
 """Characters of a session's name."""
+_JOINERS = {0x200C: None, 0x200D: None}  # which Persian words and some emoji have within them
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,9 +182,10 @@ def _name(name: str) -> str:
     name = name.strip()
     if len(name) > MAX_NAME:
         raise LandmarkError(f"The name has {len(name)} characters: give one of at most {MAX_NAME}.")
-    if not name.isprintable():
+    shown = name.translate(_JOINERS).strip()
+    if not shown.isprintable():
         raise LandmarkError(f"The name {name!r} has characters that cannot be shown: leave them out.")
-    return name
+    return name if shown else ""
 
 
 def _unknown(session: int) -> UnknownSessionError:

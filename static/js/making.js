@@ -32,7 +32,7 @@ export function mountMaking() {
   set("making", known({ making: null, waiting: [], ended: [] }));
   $("library-list").before(progress, queue, el("div", { id: "made" }));
   on(["making"], draw);
-  on(["connection"], (connection) => connection === "open" && ask());
+  on(["connection", "panel"], (connection) => connection === "open" && ask()); // whoever may have begun one meanwhile
 }
 
 /** Makes a map of a recording of the server's folder; of one with several lidars, of the one that is chosen. */
@@ -66,12 +66,14 @@ async function ask() {
   set("making", known(found));
   if (isRunning(found)) timer = setTimeout(ask, ASK_MS);
   const isNew = ({ id }) => before.making && !before.ended.some((one) => one.id === id);
-  found.ended.filter((one) => isFinished(one) && isNew(one)).forEach(tell);
+  found.ended.filter(isNew).forEach(tell);
 }
 
 const isRunning = ({ making }) => making?.state === "running";
 
-function tell({ recording, session }) {
+function tell({ recording, state, session, error }) {
+  if (state === "failed") toast(error, { title: `No map of ${recording}`, kind: "error" });
+  if (state !== "finished") return;
   toast(`Made of all scans of ${recording}.`, {
     title: `Map ${session} is finished`,
     action: { label: "Localize in it", run: () => localizeIn(session) },

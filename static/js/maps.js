@@ -6,7 +6,7 @@ import { reloadLandmarks } from "./landmarks.js";
 import { attempt, changeSetting } from "./actions.js";
 import { renameForm } from "./renaming.js";
 import { get, on, set } from "./store.js";
-import { QUESTION_MS, toast } from "./toasts.js";
+import { ask, toast } from "./toasts.js";
 import { isOfScans } from "./pose.js";
 import { moment, wholeNumber } from "./units.js";
 import { zipped } from "./zip.js";
@@ -97,7 +97,7 @@ function offer(localization, { navigation }, { sessions }) {
   const formats = hasWalls ? OF_WALLS : ofGrid ? OF_GRID : FORMATS;
   const links = () => (session === null ? [nothingToSave(isNone)] : saveLinks(session, formats));
   remake($("map-save"), [calledById(session), isBuilding, ofGrid, hasWalls, isNone], () => (isBuilding ? buildingLinks() : links()));
-  clearButton.disabled = session === null;
+  clearButton.disabled = session === null || ofGrid; // of whole scans nothing would be cleared
 }
 
 function rows(sessions, { error }, live) {
@@ -134,8 +134,8 @@ function row(session, live) {
   const about = [name && `Map ${id}`, isBuilt && "being built", source, mode === "import" && "loaded", moment(started)].filter(Boolean).join(", ");
   const lost = grid && !walls ? holds : `${holds} and their history`;
   const rename = iconButton("rename", `Rename ${called(session)}`, () => set("renamingMap", id));
-  const remove = iconButton("delete", `Delete ${called(session)}`, () => confirmDelete(id, lost));
-  return el("li", {}, button, rename, remove, el("p", { class: "about muted" }, about));
+  const remove = iconButton("delete", `Delete ${called(session)}`, () => confirmDelete(id, lost, isUsed));
+  return el("li", {}, button, rename, ...(isBuilt ? [] : [remove]), el("p", { class: "about muted" }, about));
 }
 
 const keyOf = (id) => `map-${id}`;
@@ -143,8 +143,9 @@ const keyOf = (id) => `map-${id}`;
 function renameMap(session) {
   const { id, name } = session;
   const rename = async (changed) => {
-    await attempt(() => request("PATCH", `sessions/${id}`, { name: changed }), "The map was not renamed");
-    await list();
+    const done = await attempt(() => request("PATCH", `sessions/${id}`, { name: changed }), "The map was not renamed");
+    if (done) await list();
+    return done;
   };
   const end = () => set("renamingMap", null);
   const label = `New name of ${called(session)}`;
@@ -177,10 +178,9 @@ const saveLink = (path, download, name, what) =>
 
 function chooseMap(session) {
   if (get("settings").navigation.mode !== "slam") return localizeIn(session);
-  toast("The map that SLAM builds is kept, but cannot be gone on with.", {
+  ask("The map that SLAM builds is kept, but cannot be gone on with.", {
     title: `End SLAM, and localize in ${calledById(session)}?`,
     action: { label: "Localize", run: () => localizeIn(session) },
-    linger: QUESTION_MS,
   });
 }
 
@@ -193,15 +193,14 @@ export async function localizeIn(session) {
   if (chosen) await changeSetting("navigation.mode", "localize");
 }
 
-function confirmDelete(session, lost) {
+function confirmDelete(session, lost, isUsed) {
   const remove = async () => {
     await attempt(() => request("DELETE", `sessions/${session}`), "The map was not deleted");
     await list();
   };
-  toast(`This also deletes its ${lost}.`, {
+  ask(`This also deletes its ${lost}.${isUsed ? " The sensor is no longer localized in it." : ""}`, {
     title: `Delete ${calledById(session)}?`,
     action: { label: "Delete", run: remove },
-    linger: QUESTION_MS,
   });
 }
 
@@ -212,10 +211,10 @@ function confirmClear(session) {
     await request("DELETE", `landmarks?session=${session}`);
     await Promise.all([list(), reloadLandmarks()]);
   };
-  toast("This deletes its landmarks and their history. SLAM starts again with an empty map.", {
+  const isBuilt = get("settings").navigation.mode === "slam";
+  ask(`This deletes its landmarks and their history.${isBuilt ? " SLAM starts again with an empty map." : ""}`, {
     title: `Clear ${calledById(session)}?`,
     action: { label: "Clear", run: () => attempt(clear, "The map was not cleared") },
-    linger: QUESTION_MS,
   });
 }
 

@@ -4,7 +4,7 @@ import { Problem, address, request, send } from "./api.js";
 import { $, el, icon, iconButton, remake } from "./dom.js";
 import { attempt, settings } from "./actions.js";
 import { on, set } from "./store.js";
-import { QUESTION_MS, report, toast } from "./toasts.js";
+import { ask, report } from "./toasts.js";
 import { fixed } from "./units.js";
 
 const DEGREES = 180 / Math.PI;
@@ -70,7 +70,7 @@ const pathOf = (name) => `profiles/${encodeURIComponent(name)}`;
 
 function offerOverwrite(name, body) {
   const action = { label: "Replace it", run: () => put(name, body, true) };
-  toast(`A profile named ${name} already exists.`, { title: "Not saved", action, linger: QUESTION_MS });
+  ask(`A profile named ${name} already exists.`, { title: "Not saved", action });
 }
 
 async function load(file) {
@@ -137,9 +137,8 @@ function confirmDelete(name) {
     await attempt(() => request("DELETE", pathOf(name)), "The profile was not deleted");
     await listProfiles();
   };
-  toast("The noise settings stay as they are.", {
+  ask("The noise settings stay as they are.", {
     title: `Delete profile ${name}?`,
     action: { label: "Delete", run: remove },
-    linger: QUESTION_MS,
   });
 }

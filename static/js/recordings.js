@@ -119,6 +119,7 @@ function renameRecording(name) {
   const rename = async (changed) => {
     const done = await attempt(() => request("PATCH", pathOf(name), { name: changed }), "The recording was not renamed");
     if (done) await refreshRecordings();
+    return done;
   };
   const end = () => set("renaming", null);
   return renameForm({ value: name, label: `New name of ${name}`, key: name, selected: stem(name).length, required: true, rename, end });

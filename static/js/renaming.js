@@ -2,13 +2,12 @@
 
 import { el } from "./dom.js";
 
-/** `rename` is given the new name, and asks the server; `end` is called when the form has done its work, or on Escape. */
+/** `rename` is given the new name, and says whether it is that now: then `end` is called, as it is on Escape. */
 export function renameForm({ value, label, key, selected = value.length, rename, end, ...rules }) {
   const input = el("input", { type: "text", value, "aria-label": label, "data-key": key, ...rules });
   const submit = async (event) => {
     event.preventDefault();
-    await rename(input.value.trim());
-    end();
+    if (await rename(input.value.trim())) end();
   };
   const cancel = ({ key: pressed }) => pressed === "Escape" && end();
   const form = el(

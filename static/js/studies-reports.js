@@ -4,7 +4,7 @@
 import { address, request } from "./api.js";
 import { $, el, iconButton, remake, setText } from "./dom.js";
 import { get, on, set } from "./store.js";
-import { QUESTION_MS, report as tell, toast } from "./toasts.js";
+import { ask, report as tell } from "./toasts.js";
 import { bytes, duration, fineDegrees, millimetres, moment } from "./units.js";
 
 const wide = matchMedia("(min-width: 900px)");
@@ -89,10 +89,9 @@ function confirmDelete({ name, kind }, refresh) {
     }
     await refresh();
   };
-  toast(`\u201c${titleOf(kind)}\u201d (${name}) will be deleted from the server.`, {
+  ask(`\u201c${titleOf(kind)}\u201d (${name}) will be deleted from the server.`, {
     title: "Delete this report?",
     action: { label: "Delete", run },
-    linger: QUESTION_MS,
   });
 }
 

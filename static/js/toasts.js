@@ -3,8 +3,7 @@
 
 import { $, el, iconButton } from "./dom.js";
 
-export const QUESTION_MS = 30_000; // for messages that ask something
-
+const QUESTION_MS = 30_000; // for messages that ask something
 const LINGER_MS = 12_000;
 const LOOK_AGAIN_MS = 2000;
 const MOST = 3;
@@ -28,6 +27,12 @@ export function toast(text, { title = "", kind = "info", action = null, about = 
   region.append(node);
   while (region.children.length > MOST) region.firstElementChild.remove();
   removeLater(node, linger);
+}
+
+/** Asks something; an earlier question that has no answer yet is given up, lest the answer to one is taken for another's. */
+export function ask(text, { title, action }) {
+  clearToasts("question");
+  toast(text, { title, action, about: "question", linger: QUESTION_MS });
 }
 
 /** Removes the messages about something that is settled: the "source", or the "connection". */

@@ -5,7 +5,7 @@ import { $, el, icon, iconButton, setText } from "./dom.js";
 import { refreshRecordings } from "./recordings.js";
 import { open } from "./actions.js";
 import { showPanel } from "./tabs.js";
-import { QUESTION_MS, report, toast } from "./toasts.js";
+import { ask, report } from "./toasts.js";
 import { bytes } from "./units.js";
 
 const FORMATS = "ROS 1 and 2 bags, MCAP, CARMEN logs, RPLIDAR CSV and dumps, MATLAB, NumPy";
@@ -66,7 +66,7 @@ async function upload(file, overwrite = false) {
 function offerOverwrite(file) {
   const action = { label: "Replace it", run: () => upload(file, true) };
   const text = `The server already has a recording named ${file.name}.`;
-  toast(text, { title: "Not uploaded", action, linger: QUESTION_MS });
+  ask(text, { title: "Not uploaded", action });
 }
 
 const ABORTED = -1;

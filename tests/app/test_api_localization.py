@@ -235,9 +235,11 @@ def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(drivi
     driving.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
     located(driving, lambda where: where["mode"] == "localize")
     assert driving.http.delete(f"/sessions/{session}").status_code == 204
-    driving.change("POST", "/localization/reset", None)
     with driving.stream() as stream:
-        assert str(session) in stream.state(lambda s: s["localization"]["problem"])["localization"]["problem"]
+        state = stream.state(lambda s: s["localization"]["problem"])["localization"]
+    assert f"no session {session}" in state["problem"]
+    assert state["session"] is None
+    assert "no session" in assert_problem(driving.http.get("/pose"), 404)["detail"]
     driving.change("PUT", "/localization/map", {"session": None})
     driving.change("PATCH", "/settings", SLAM)
     located(driving, lambda where: where["mode"] == "slam")

@@ -136,14 +136,21 @@ def test_walls_of_a_map_that_is_loaded_again_are_localized_in_and_saved(
 
 
 def test_a_zip_whose_walls_make_no_sense_is_refused_and_leaves_nothing(
-    shared_server: Server, ros_map: Path
+    shared_server: Server, ros_map: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setenv("TMPDIR", str(tmp_path))  # of the process that reads
     before = shared_server.get("/sessions")["sessions"]
     image = ros_map.with_suffix(".pgm").read_bytes()
-    body = packed(("hall.yaml", ros_map.read_bytes()), ("hall.pgm", image), ("walls.csv", b"id\n1\n"))
+    files = [("hall.yaml", ros_map.read_bytes()), ("hall.pgm", image)]
+    body = packed(*files, ("walls.csv", b"id\n1\n"))
     answer = shared_server.http.post("/map", params={"format": "zip"}, content=body)
     assert "walls.csv: It lacks the columns" in assert_problem(answer, 422)["detail"]
     assert shared_server.get("/sessions")["sessions"] == before
+    for _ in range(5):  # the process that reads may end before or after it is killed
+        loaded = shared_server.http.post("/map", params={"format": "zip"}, content=packed(*files)).json()
+        assert not list(tmp_path.glob("lidarcore-map-*"))  # what was unpacked
+        shared_server.http.delete(f"/sessions/{loaded['id']}").raise_for_status()
 
 
 @pytest.mark.parametrize(

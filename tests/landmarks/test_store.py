@@ -366,6 +366,12 @@ def test_a_name_that_cannot_be_shown_or_is_too_long_names_nothing(atlas):
     with pytest.raises(LandmarkError, match="The name"):
         atlas.rename(session, "\ud800")
     assert atlas.session(session).name == "x" * MAX_NAME
+    for name in ("\u202eback", "a\u200d\nb"):
+        with pytest.raises(LandmarkError, match="The name"):
+            atlas.rename(session, name)
+    atlas.rename(session, " \u200c ")
+    assert atlas.session(session).name == ""
+    atlas.rename(session, "\u0645\u06cc\u200c\u062e\u0648\u0627\u0647\u0645")  # Persian joins within a word
     with pytest.raises(UnknownSessionError):
         atlas.rename(session + 1, "y")
 

@@ -54,9 +54,13 @@ def rename(
 
 @router.delete("/{id}", status_code=204, responses=documented(404, 409, 422))
 def delete(server: Server, id: Annotated[int, Path(examples=[3])]) -> None:
-    """Delete a session with its landmarks and their history. 409 for the one that is being written."""
+    """Delete a session with its landmarks and their history; who is localized in it is so no longer.
+
+    409 for the one that is being written.
+    """
     if server.landmarks.writes(id):
         raise ConflictError(
             f"Session {id} is being written: reset localization to begin another one, or stop SLAM."
         )
     server.landmarks.atlas.delete(id)
+    server.runtime.navigation.leave_map(id)
