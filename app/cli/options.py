@@ -68,7 +68,7 @@ def check_folder(file: Path, option: str = "--output") -> None:
 
 
 def named_folder(name: str) -> Path:
-    """Raises BadParameter if the name is empty, as of a variable that is not set: that were the working folder."""
+    """Raises BadParameter if the name is empty, as of a variable that is not set: it would mean the working folder."""
     if not name.strip():
         raise typer.BadParameter("the name of the folder is empty: give one, or . for the working folder.")
     return Path(name)

@@ -48,10 +48,9 @@ def building_of(path: Path) -> Building:
 
     Raises MapFileError or GridError.
     """
+    # A folder of this process: the one that reads is killed once it has read, and might leave it behind.
     with (
-        tempfile.TemporaryDirectory(
-            prefix="lidarcore-map-"
-        ) as folder,  # the process that reads may be killed
+        tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder,
         closing(Isolated("the map", MapFileError, _read_building, path, Path(folder))) as reading,
     ):
         return next(iter(reading))

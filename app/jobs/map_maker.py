@@ -6,7 +6,8 @@ from itertools import count
 from pathlib import Path
 
 from lidarcore import LidarError
-from lidarcore.landmarks import MAX_NAME
+from lidarcore.errors import LandmarkError
+from lidarcore.landmarks import MAX_NAME, session_name
 
 from ..errors import ConflictError, NotFoundError
 from ..pipeline.settings import Settings
@@ -122,6 +123,7 @@ class MapMaker:
 
 
 def _name_of(recording: str) -> str:
-    """What the map of a recording is called until somebody renames it."""
-    name = Path(recording).stem[:MAX_NAME]
-    return name if name.isprintable() else ""
+    """What the map of a recording is called until somebody renames it: as that, if it can be shown."""
+    with suppress(LandmarkError):
+        return session_name(Path(recording).stem[:MAX_NAME])
+    return ""

@@ -1,6 +1,6 @@
 """Landmarks that outlive a run: an embedded database of maps with spatial queries, and exchange with other programs."""
 
-from lidarcore.landmarks.atlas import MAX_NAME, Atlas, Session
+from lidarcore.landmarks.atlas import MAX_NAME, Atlas, Session, session_name
 from lidarcore.landmarks.exchange import FORMATS, export_map, import_map, read_landmarks, write_landmarks
 from lidarcore.landmarks.landmark import MAX_COORDINATE, MAX_ID, Landmark
 from lidarcore.landmarks.landmark_map import LandmarkMap
@@ -31,5 +31,6 @@ __all__ = [
     "export_picture",
     "import_map",
     "read_landmarks",
+    "session_name",
     "write_landmarks",
 ]

@@ -78,7 +78,7 @@ class Atlas(Closing):
         Raises LandmarkError if the name cannot be one.
         """
         check_finite(started=started)
-        name = _name(name)
+        name = session_name(name)
         with self._database.writing() as connection:
             query = "INSERT INTO sessions (source, mode, started, name) VALUES (?, ?, ?, ?) RETURNING id"
             (session,) = connection.execute(query, (source, mode, started, name)).fetchone()
@@ -98,7 +98,7 @@ class Atlas(Closing):
 
         Raises UnknownSessionError, or LandmarkError if the name is longer than MAX_NAME or cannot be shown.
         """
-        name = _name(name)
+        name = session_name(name)
         with self._database.writing() as connection:
             query = "UPDATE sessions SET name = ?2 WHERE id = ?1"
             if not connection.execute(query, (session, name)).rowcount:
@@ -177,8 +177,8 @@ def _session(row: tuple[Any, ...]) -> Session:
     return replace(session, grid=bool(session.grid))
 
 
-def _name(name: str) -> str:
-    """The name without blanks around. Raises LandmarkError."""
+def session_name(name: str) -> str:
+    """The name without blanks around. Raises LandmarkError if it is longer than MAX_NAME or cannot be shown."""
     name = name.strip()
     if len(name) > MAX_NAME:
         raise LandmarkError(f"The name has {len(name)} characters: give one of at most {MAX_NAME}.")

@@ -198,7 +198,7 @@ function confirmDelete(session, lost, isUsed) {
     await attempt(() => request("DELETE", `sessions/${session}`), "The map was not deleted");
     await list();
   };
-  ask(`This also deletes its ${lost}.${isUsed ? " The sensor is no longer localized in it." : ""}`, {
+  ask(`This also deletes its ${lost}.${isUsed ? " The sensor will no longer be localized in it." : ""}`, {
     title: `Delete ${calledById(session)}?`,
     action: { label: "Delete", run: remove },
   });

@@ -23,7 +23,6 @@ class Recovery:
     def __init__(self, factor: SuperLU) -> None:
         self._factor = factor
         self._count = int(factor.shape[0]) // 3  # of the nodes that the factor knows
-        self._triangular: tuple[Ints, Ints, Array, Array, Ints] | None = None
         self._own: Array | None = None
         self._columns: dict[int, Array] = {}
         # Of each node after those of the factor: how it moves with the factor's last one, and its own covariance.
@@ -100,11 +99,9 @@ class Recovery:
 
     @property
     def _parts(self) -> tuple[Ints, Ints, Array, Array, Ints]:
-        """The factor, as the kernels take it: taking it apart costs more than solving for a column."""
-        if self._triangular is None:
-            L, pivots = self._factor.L, self._factor.U.diagonal()
-            self._triangular = L.indptr, L.indices, L.data, pivots, self._factor.perm_r
-        return self._triangular
+        """The factor, as the kernels take it."""
+        L, pivots = self._factor.L, self._factor.U.diagonal()
+        return L.indptr, L.indices, L.data, pivots, self._factor.perm_r
 
 
 def factor(H: csc_array) -> SuperLU:
