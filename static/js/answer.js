@@ -4,14 +4,14 @@
 import { changeSetting, setting } from "./actions.js";
 import { $, el, setText } from "./dom.js";
 import { get } from "./store.js";
-import { fixed } from "./units.js";
+import { fixed, ratio } from "./units.js";
 
 const QUESTIONS = [
   {
     key: "area_ratio",
     label: "claimed / real area",
     title: "Area of the claimed ellipses over that of the scatter: 1 if they are true",
-    text: (value) => fixed(value, 2),
+    text: ratio,
     off: (value) => Math.abs(Math.log(value)),
   },
   {

@@ -6,7 +6,7 @@ import { $, el, setText, swatch } from "./dom.js";
 import { selectableRows } from "./rows.js";
 import { select } from "./actions.js";
 import { get, on, set } from "./store.js";
-import { degrees, metres, millimetres, squareMillimetres, UNKNOWN } from "./units.js";
+import { degrees, ellipseArea, metres, millimetres, UNKNOWN } from "./units.js";
 
 const PLACE = [
   { key: "x", label: "x", unit: "m", text: metres },
@@ -16,7 +16,7 @@ const SIGMAS = [
   { key: "sigma_x", label: "σx", unit: "mm", text: millimetres },
   { key: "sigma_y", label: "σy", unit: "mm", text: millimetres },
 ];
-const AREA = [{ key: "area", label: "area", unit: "mm²", text: squareMillimetres }];
+const AREA = [{ key: "area", label: "area", unit: "mm²", text: ellipseArea }];
 const ANGLE = [{ key: "angle", label: "angle", unit: "°", text: degrees }];
 
 const NARROW = matchMedia("(max-width: 479px)");

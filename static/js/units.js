@@ -34,6 +34,14 @@ export const degrees = (value) => fixed(value / DEGREE, 1);
 export const fineDegrees = (value) => fixed(value / DEGREE, 3);
 export const squareMillimetres = (value) => fixed(value * 1e6, Math.abs(value) < 1e-5 ? 1 : 0);
 
+/** The area of an ellipse where there is little room: in mm², from 0.1 m² with two digits. */
+export const ellipseArea = (value) => (value >= 0.1 ? exponential(value * 1e6) : squareMillimetres(value));
+
+/** A ratio with three digits, as 0.95, 12.3 or 456; from 100,000 with two. */
+export const ratio = (value) => (value >= 1e5 ? exponential(value) : fixed(value, value < 9.995 ? 2 : value < 99.95 ? 1 : 0));
+
+const exponential = (value) => value.toExponential(1).replace("+", "");
+
 /** A standard deviation of a place: in millimetres, above a metre in metres with three digits. */
 export function spread(value) {
   if (!(value >= 1)) return `${millimetres(value)}\u2009mm`;

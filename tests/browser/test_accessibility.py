@@ -112,9 +112,24 @@ def test_the_table_of_corners_fits_a_phone(phone: Visitor) -> None:
     expect(page.locator("#answer-coverage_95-ml")).to_have_text(re.compile(r"^\d+.%$"))
     assert table.evaluate(fits)
     server.pause()
+    assert table.evaluate(OVERFLOW_OF_THE_LONGEST) == [0, []]
     page.set_viewport_size({"width": 844, "height": 390})
     expect(heads).to_have_count(2 + 6 * 3 + 1)
 
+
+OVERFLOW_OF_THE_LONGEST = """(scroll) => {
+  const put = (cells, text) => scroll.querySelectorAll(cells).forEach((cell) => cell.textContent = text);
+  put("tbody :is(.x, .y)", "\u221212.345");
+  put("tbody .angle", "\u2212179.9");
+  put(":is(tbody .area, .answer td[id])", "99999");
+  const cells = [...scroll.querySelectorAll(":is(tbody td, .answer td[id])")].filter((cell) => {
+    const text = document.createRange();
+    text.selectNodeContents(cell);
+    const [inside, outside] = [text.getBoundingClientRect(), cell.getBoundingClientRect()];
+    return inside.left < outside.left || inside.right > outside.right;
+  });
+  return [scroll.scrollWidth - scroll.clientWidth, cells.map((cell) => `${cell.className}: ${cell.textContent}`)];
+}"""
 
 TWO_MESSAGES = """import('/static/js/toasts.js').then(({ toast }) => {
   for (const title of ["Earlier", "Newest"]) toast("It says so.", { title });
