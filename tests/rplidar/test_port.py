@@ -37,7 +37,11 @@ class Line:
     """A pseudo-terminal: `path` is a port, what is written to `far` arrives there."""
 
     def __init__(self) -> None:
+        # New terminals get the lowest free numbers: some are left, lest another process gets this one once it is cut.
+        lower = [os.openpty() for _ in range(8)]
         self.far, self._near = os.openpty()
+        for end in itertools.chain(*lower):
+            os.close(end)
         self.path = os.ttyname(self._near)
         self.is_cut = False
 
