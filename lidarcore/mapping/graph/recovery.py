@@ -5,11 +5,12 @@ from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.compiled import kernel
+from lidarcore.compiled import inlined, kernel
 from lidarcore.geometry import UncertainPose, relative_jacobians
 from lidarcore.geometry.kernels import relative_with_covariance
 
 _KEPT = 3_000_000  # rows of three columns each: 72 MB
+_AHEAD = 8  # nodes whose columns are solved for together, which takes little more than those of one
 _DIGITS = 1e-8  # share of a covariance that is left of it with at least three digits
 
 
@@ -59,7 +60,7 @@ class Recovery:
         """
         own, other = self.block(i, i), self.block(j, j)
         pose, P = relative_with_covariance(poses[i], poses[j], own, self.block(i, j), other)
-        if max(i, j) < self._count and P.trace() < _DIGITS * (own.trace() + other.trace()):
+        if max(i, j) < self._count and _size(P) < _DIGITS * (_size(own) + _size(other)):
             P = self._tied(i, j, *relative_jacobians(poses[i], poses[j]))
         return UncertainPose(pose, P)
 
@@ -83,25 +84,34 @@ class Recovery:
         if self._own is None:
             self._own = selected_inverse(*self._parts)
             for k in np.flatnonzero(np.isnan(self._own).any(axis=(1, 2))).tolist():
-                self._own[k] = self._solved(k)[3 * k : 3 * k + 3]
+                self._own[k] = self._solved(k, 1)[3 * k : 3 * k + 3]
         return self._own
 
     def _column(self, j: int) -> Array:
+        """(3 N, 3) covariances of all nodes with one. Who asks for one after the other is given some at once."""
         if j not in self._columns:
             if len(self._columns) * self._factor.shape[0] > _KEPT:
                 self._columns.clear()
-            self._columns[j] = self._solved(j)
+            nodes = min(_AHEAD if j - 1 in self._columns else 1, self._count - j)
+            for k, columns in enumerate(np.split(self._solved(j, nodes), nodes, axis=1), j):
+                self._columns[k] = columns
         return self._columns[j]
 
-    def _solved(self, j: int) -> Array:
-        """(3 N, 3) covariances of all nodes with one."""
-        return columns_of_inverse(*self._parts, 3 * j)
+    def _solved(self, j: int, nodes: int) -> Array:
+        """(3 N, 3 M) covariances of all nodes with M from node j on."""
+        return columns_of_inverse(*self._parts, 3 * j, 3 * nodes)
 
     @property
     def _parts(self) -> tuple[Ints, Ints, Array, Array, Ints]:
         """The factor, as the kernels take it."""
         L, pivots = self._factor.L, self._factor.U.diagonal()
         return L.indptr, L.indices, L.data, pivots, self._factor.perm_r
+
+
+@kernel
+def _size(P: Array) -> float:
+    """Trace of a covariance (3, 3)."""
+    return P[0, 0] + P[1, 1] + P[2, 2]
 
 
 def factor(H: csc_array) -> SuperLU:
@@ -149,31 +159,32 @@ def selected_inverse(begins: Ints, rows: Ints, lower: Array, pivots: Array, orde
 
 @kernel
 def columns_of_inverse(
-    begins: Ints, rows: Ints, lower: Array, pivots: Array, order: Ints, first: int
+    begins: Ints, rows: Ints, lower: Array, pivots: Array, order: Ints, first: int, count: int
 ) -> Array:
-    """Three columns (3 N, 3) of the inverse of the same matrix, from the first one on."""
-    solved = np.zeros((len(pivots), 3))
-    for m in range(3):
+    """So many columns (3 N, count) of the inverse of the same matrix, from the first one on."""
+    solved = np.zeros((len(pivots), count))
+    for m in range(count):
         solved[order[first + m], m] = 1.0
-    for j in range(order[first : first + 3].min(), len(pivots)):
-        a, b, c = solved[j]
-        if a == b == c == 0.0:
+    for j in range(order[first : first + count].min(), len(pivots)):
+        if (solved[j] == 0.0).all():
             continue
         for e in range(begins[j], begins[j + 1]):
             if rows[e] != j:
-                solved[rows[e], 0] -= lower[e] * a
-                solved[rows[e], 1] -= lower[e] * b
-                solved[rows[e], 2] -= lower[e] * c
+                _take(solved, rows[e], lower[e], j)
     solved /= pivots.reshape(-1, 1)
     for j in range(len(pivots) - 1, -1, -1):
-        a, b, c = solved[j]
         for e in range(begins[j], begins[j + 1]):
             if rows[e] != j:
-                a -= lower[e] * solved[rows[e], 0]
-                b -= lower[e] * solved[rows[e], 1]
-                c -= lower[e] * solved[rows[e], 2]
-        solved[j, 0], solved[j, 1], solved[j, 2] = a, b, c
+                _take(solved, j, lower[e], rows[e])
     return solved[order]
+
+
+@inlined
+def _take(solved: Array, i: int, times: float, j: int) -> None:
+    """Take row j from row i so many times."""
+    row, other = solved[i], solved[j]
+    for m in range(len(row)):
+        row[m] -= times * other[m]
 
 
 @kernel

@@ -37,12 +37,12 @@ class Passes:
                 continue
             closest = int(run[np.argmin(distances[run])])
             P = self._graph.relative(closest, k)[1]
-            if P[2, 2] > VAGUE**2 or np.linalg.eigvalsh(P)[0] <= 0:  # of islands, rounding may leave nothing
+            radius = min(settings.distance + settings.sigmas * spread(P), settings.farthest)
+            if P[2, 2] > VAGUE**2 or distances[closest] > radius or (np.diagonal(P) < _KNOWN**2).all():
                 continue
-            radius = settings.distance + settings.sigmas * spread(P)
-            if distances[closest] > min(radius, settings.farthest) or (np.diagonal(P) < _KNOWN**2).all():
+            if np.linalg.eigvalsh(P)[0] <= 0:  # of islands, rounding may leave nothing
                 continue
-            best = self.best(run[distances[run] < min(radius, settings.farthest)], k, P)
+            best = self.best(run[distances[run] < radius], k, P)
             if best is not None:
                 found.append((float(np.linalg.det(P)), best, P))
         found.sort(key=lambda place: -place[0])

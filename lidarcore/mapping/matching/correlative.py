@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.compiled import kernel
+from lidarcore.compiled import finite_kernel, kernel
 from lidarcore.geometry import wrap
 from lidarcore.geometry.kernels import rotate
 from lidarcore.mapping.settings import MatchSettings
@@ -114,13 +114,14 @@ def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Array]:
     return low, grid
 
 
-@kernel
+@finite_kernel
 def _splat(points: Array, blur: float, grid: Array) -> None:
     """Largest of the Gaussians around the points, all in cells."""
     reach = int(np.ceil(_REACH * blur))
     along, across = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
     for k in range(len(points)):
-        i, j = int(points[k, 0]) - reach, int(points[k, 1]) - reach
+        # The margin leaves nothing below 0: who compiles this is told, so that the loops vectorise.
+        i, j = max(int(points[k, 0]) - reach, 0), max(int(points[k, 1]) - reach, 0)
         for n in range(2 * reach + 1):
             along[n] = np.exp(-((i + n + 0.5 - points[k, 0]) ** 2) / (2 * blur * blur))
             across[n] = np.exp(-((j + n + 0.5 - points[k, 1]) ** 2) / (2 * blur * blur))
@@ -129,7 +130,7 @@ def _splat(points: Array, blur: float, grid: Array) -> None:
                 grid[i + m, j + n] = max(grid[i + m, j + n], along[m] * across[n])
 
 
-@kernel
+@finite_kernel
 def _blocks(fine: Array) -> Array:
     """Largest score in each block and its next neighbours: what a point of the block can meet within a block's side."""
     blocks = np.zeros((fine.shape[0] // _BLOCK, fine.shape[1] // _BLOCK), np.float32)
@@ -165,6 +166,9 @@ def _search(
         a, b = divmod(block, bounds.shape[2])
         u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
         _sum_scores(fine, cells[t], u, v, scores)
+        limits[n] = scores.max() - _least_penalty(u, v, turns[t], window.sigma)
+        if limits[n] <= best:
+            continue
         limits[n] = -np.inf
         for du in range(u, u + _BLOCK):
             for dv in range(v, v + _BLOCK):
@@ -201,9 +205,7 @@ def _bounds(blocks: Array, cells: Ints, window: _Window) -> Array:
         for a in range(bounds.shape[1]):
             for b in range(bounds.shape[2]):
                 u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
-                # The shift of the block that is nearest to the guess has the smallest penalty.
-                du, dv = min(max(u, 0), u + _BLOCK - 1), min(max(v, 0), v + _BLOCK - 1)
-                bounds[t, a, b] -= _penalty(du, dv, turns[t], window.sigma)
+                bounds[t, a, b] -= _least_penalty(u, v, turns[t], window.sigma)
     return bounds
 
 
@@ -212,8 +214,8 @@ def _sum_scores(fine: Array, cells: Ints, u: int, v: int, scores: Array) -> None
     """Sums of the scores of points in cells (N, 2), for each shift in the block from (u, v) on; 0 beyond the grid."""
     scores[:] = 0.0
     for k in range(len(cells)):
-        i = min(max(cells[k, 0] + u, 0), fine.shape[0] - _BLOCK)
-        j = min(max(cells[k, 1] + v, 0), fine.shape[1] - _BLOCK)
+        i = max(min(cells[k, 0] + u, fine.shape[0] - _BLOCK), 0)
+        j = max(min(cells[k, 1] + v, fine.shape[1] - _BLOCK), 0)
         for a in range(_BLOCK):
             for b in range(_BLOCK):
                 scores[a, b] += fine[i + a, j + b]
@@ -227,6 +229,12 @@ def _is_close(others: Array, close: Array, du: float, dv: float, turn: float) ->
         if away < close[0] * close[0] and abs(others[k, 2] - turn) < close[1]:
             return True
     return False
+
+
+@kernel
+def _least_penalty(u: int, v: int, turn: float, sigma: Array) -> float:
+    """Of the shifts in the block from (u, v) on: that of the one nearest to the guess."""
+    return _penalty(min(max(u, 0), u + _BLOCK - 1), min(max(v, 0), v + _BLOCK - 1), turn, sigma)
 
 
 @kernel

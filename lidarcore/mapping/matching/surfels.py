@@ -37,47 +37,67 @@ class Surfels(NamedTuple):
 
 def surfels(seen: Patches, size: float, cell: float) -> Surfels:
     """Elements of `size` m from patches in the frame of the map, to be found within `cell` m."""
-    means, normals, weights = seen.means, seen.normals, 1 / seen.variances
-    key = cells(means, normals, size, _GAP)
-    order = np.argsort(key, kind="stable")
-    starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-    number = np.diff(starts, append=len(order))
-
-    def of_cells(values: Array) -> Array:
-        return np.add.reduceat(values[order], starts) if len(starts) else values
-
-    total, tilt = of_cells(weights), of_cells(weights * seen.tilts)
-    mean, normal = (of_cells(weights[:, None] * v) for v in (means, normals))
-    length = np.hypot(*normal.T)
-    rows = mean / total[:, None], normal / length[:, None], 1 / total, tilt / total / number
-    return _sorted(*rows, of_cells(seen.counts) > 0, cell)
-
-
-def _sorted(
-    means: Array, normals: Array, variances: Array, tilts: Array, near: Bools, cell: float
-) -> Surfels:
+    number = cells(seen.means, seen.normals, size, _GAP)
+    means, normals, variances, tilts, near = _merged(*seen, number, int(number.max(initial=-1)) + 1)
     low = means.min(axis=0) - cell if len(means) else np.zeros(2)
     at = np.floor((means - low) / cell).astype(np.int64)
-    shape = np.minimum(at.max(axis=0, initial=0) + 2, int(np.sqrt(_CELLS)))
-    kept = np.flatnonzero((at < shape).all(axis=1))
-    flat = at[kept, 0] * (shape[1] + 1) + at[kept, 1]
-    order = kept[np.argsort(flat, kind="stable")]
-    first = np.zeros((shape[0], shape[1] + 1), np.int64)
-    _index(at[order], first)
+    width, height = np.minimum(at.max(axis=0, initial=0) + 2, int(np.sqrt(_CELLS)))
+    first = np.zeros((width, height + 1), np.int64)
+    order = _sorted(at, first)
     return Surfels(
         means[order], normals[order], variances[order], tilts[order], near[order], low, cell, first
     )
 
 
 @kernel
-def _index(at: Ints, first: Ints) -> None:
-    """Where the elements (M, 2), sorted, of each cell begin."""
-    k = 0
-    for i in range(first.shape[0]):
-        for j in range(first.shape[1]):
-            first[i, j] = k
-            while k < len(at) and at[k, 0] == i and at[k, 1] == j:
-                k += 1
+def _merged(
+    means: Array, normals: Array, variances: Array, tilts: Array, counts: Array, number: Ints, elements: int
+) -> tuple[Array, Array, Array, Array, Bools]:
+    """The elements that patches with the same number make together: the first five fields of Surfels."""
+    mean, normal = np.zeros((elements, 2)), np.zeros((elements, 2))
+    weight, tilt, patches = np.zeros(elements), np.zeros(elements), np.zeros(elements)
+    near = np.zeros(elements, np.bool_)
+    for i in range(len(number)):
+        k, w = number[i], 1 / variances[i]
+        for axis in range(2):
+            mean[k, axis] += w * means[i, axis]
+            normal[k, axis] += w * normals[i, axis]
+        weight[k] += w
+        tilt[k] += w * tilts[i]
+        patches[k] += 1
+        near[k] |= counts[i] > 0
+    for k in range(elements):
+        length = np.hypot(normal[k, 0], normal[k, 1])
+        for axis in range(2):
+            mean[k, axis] /= weight[k]
+            normal[k, axis] /= length
+        tilt[k] /= weight[k] * patches[k]
+    return mean, normal, 1 / weight, tilt, near
+
+
+@kernel
+def _sorted(at: Ints, first: Ints) -> Ints:
+    """The elements, which lie in cells (M, 2), by their cells, less those beyond the grid.
+
+    first (W, H + 1), of zeros, becomes that of Surfels.
+    """
+    inside = 0
+    for a, b in at:
+        if a < first.shape[0] and b < first.shape[1] - 1:
+            first[a, b] += 1
+            inside += 1
+    end = 0
+    for a in range(first.shape[0]):
+        for b in range(first.shape[1]):
+            end += first[a, b]
+            first[a, b] = end
+    order = np.empty(inside, np.int64)
+    for k in range(len(at) - 1, -1, -1):
+        a, b = at[k]
+        if a < first.shape[0] and b < first.shape[1] - 1:
+            first[a, b] -= 1
+            order[first[a, b]] = k
+    return order
 
 
 @kernel
