@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from lidarcore import Scan
 from lidarcore.geometry import act, act_inverse, compose, pose_difference, relative, rotate
 from lidarcore.mapping import MatchSettings
+from lidarcore.mapping.cells import cells
 from lidarcore.mapping.matching.correlative import candidates, search
 from lidarcore.mapping.matching.patches import joined, patches, placed
 from lidarcore.mapping.matching.registration import linearised, register
@@ -131,6 +132,39 @@ def test_the_search_finds_the_best_pose_of_its_window_and_the_best_one_besides()
         away = relative(before, other)
         assert ((np.hypot(*away[:, :2].T) > 0.4) | (abs(away[:, 2]) > 0.24)).all()
         assert other == pytest.approx(next(besides(before)))  # as if looked for alone
+
+
+def test_a_place_far_from_the_guess_wins_if_more_fits_there_than_the_way_costs():
+    """30 points fit there, which costs 3.5, and 25 beside the guess."""
+    points = np.random.default_rng(5).uniform(-6, 6, (30, 2))
+    far, settings = np.array([2.65, 0.0]), MatchSettings(cell=0.1, blur=0.1, max_shift=3.0)
+    found = search(
+        np.vstack([points + far, points[:25]]), points, np.zeros(3), np.array([1.0, 1.0, 0.02]), settings
+    )
+    np.testing.assert_allclose(found, [*far, 0.0], atol=0.06)
+
+
+def test_surfels_are_the_weighted_means_of_the_patches_in_their_cells():
+    rng = np.random.default_rng(6)
+    seen = joined([patches(full_scan(ROOM, random_pose(ROOM, rng), NOISE, rng), MATCH) for _ in range(5)])
+    map, number = surfels(seen, MATCH.patch, MATCH.reach), cells(seen.means, seen.normals, MATCH.patch, 0.1)
+    assert len(map.means) == len(np.unique(number)) < len(number)
+    for k in np.unique(number):
+        of_cell = [column[number == k] for column in seen]
+        means, normals, variances, tilts, counts = of_cell
+        weights = 1 / variances
+        mean, normal = (np.average(column, axis=0, weights=weights) for column in (means, normals))
+        found = int(np.argmin(np.hypot(*(map.means - mean).T)))
+        np.testing.assert_allclose(map.means[found], mean, atol=1e-9)
+        np.testing.assert_allclose(map.normals[found], normal / np.hypot(*normal), atol=1e-9)
+        np.testing.assert_allclose(map.variances[found], 1 / weights.sum())
+        np.testing.assert_allclose(map.tilts[found], np.average(tilts, weights=weights) / len(tilts))
+        assert map.near[found] == (counts > 0).any()
+    assert all(
+        ((map.means[map.first[i, j] : map.first[i, j + 1]] - map.low) // map.cell == [i, j]).all()
+        for i in range(map.first.shape[0])
+        for j in range(map.first.shape[1] - 1)
+    )
 
 
 @pytest.mark.parametrize("turn", [0.0, np.pi / 2])
