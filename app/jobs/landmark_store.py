@@ -5,6 +5,7 @@ from collections.abc import Callable, Hashable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import Lock
 from typing import NamedTuple
 
 from lidarcore.errors import MapFileError, UnknownSessionError
@@ -12,12 +13,19 @@ from lidarcore.landmarks import Atlas, LandmarkMap, Session
 from lidarcore.localization import Landmarks
 from lidarcore.localization import from_stored as landmarks_from_stored
 from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.walls import WallTable
+from lidarcore.mapping.walls import JointWalls, WallTable, unpack_covariance
 
 from .map_file import building_of, landmarks_of
 from .map_writer import MapWriter
 from .session_writer import MapChange, SessionWriter
-from .wall_writer import WallWriter, from_stored, grid_from_stored, grid_to_stored, to_stored
+from .wall_writer import (
+    WallWriter,
+    covariance_to_stored,
+    from_stored,
+    grid_from_stored,
+    grid_to_stored,
+    to_stored,
+)
 from .write_queue import WriteQueue
 
 PATIENCE = 2.0  # s to wait while another process writes
@@ -62,6 +70,7 @@ class LandmarkStore:
         self.listeners: list[Callable[[MapChange], None]] = []
         self._run: SessionWriter | None = None
         self._used: int | None = None
+        self._unpacking = Lock()  # for one map at a time: with many walls it takes 200 MB
         # By what is replayed, the sessions of its finished maps, and from when to when they saw something.
         self._finished: dict[Hashable, dict[int, Span]] = {}
         self._queue = WriteQueue(self._tell, self._replace_earlier)
@@ -109,6 +118,17 @@ class LandmarkStore:
         """The walls that a session has in the file. Raises UnknownSessionError."""
         return from_stored(self.atlas[session].walls())
 
+    def joint_walls(self, session: int) -> JointWalls | None:
+        """The walls that a session has, knowing how they err together; None if that is not kept.
+
+        Raises UnknownSessionError, or MapFileError if it is damaged.
+        """
+        walls, together = self.atlas[session].walls_together()
+        if together is None:
+            return None
+        with self._unpacking:
+            return unpack_covariance(together, from_stored(walls))
+
     def use(self, session: int | None) -> None:
         """The run ends; questions that name no session are about this one now, or about the newest if it is None."""
         if self._run:
@@ -154,8 +174,9 @@ class LandmarkStore:
         loaded = self.atlas.begin(source, now, mode, found, name)
         if building:
             grid = grid_to_stored(building.grid)
-            walls = [] if building.walls is None else to_stored(building.walls)
-            loaded.put_walls(walls, grid)
+            found_walls = from_stored([]) if building.walls is None else building.walls
+            walls, together = to_stored(found_walls), covariance_to_stored(found_walls)
+            loaded.put_walls(walls, grid, together)
         self.atlas.end(loaded.session, now)
         return self.atlas.session(loaded.session)
 

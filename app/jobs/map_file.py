@@ -11,7 +11,7 @@ from zipfile import BadZipFile, ZipFile
 
 from lidarcore.errors import MapFileError
 from lidarcore.landmarks import Landmark, read_landmarks
-from lidarcore.mapping.export import read_walls_csv
+from lidarcore.mapping.export import COVARIANCE_FILE, read_walls
 from lidarcore.mapping.grid import OccupancyGrid, read_ros_map
 from lidarcore.mapping.walls import WallTable
 
@@ -20,7 +20,7 @@ from ..isolation import Isolated
 MOST = 250_000  # landmarks, which take 100 MB; a house has some hundred
 _YAMLS = (".yaml", ".yml")
 _PARTS = (*_YAMLS, ".pgm", ".png", ".bmp")
-_WALLS = "walls.csv"  # beside the YAML
+_WALLS = "walls.csv"  # beside the YAML, as the next one
 _MOST_PARTS, _MOST_BYTES = 20, 200_000_000  # of a zip, unpacked
 _TOGETHER = 1000  # landmarks that come over at a time
 
@@ -37,7 +37,7 @@ def landmarks_of(path: Path, format: str) -> list[Landmark]:
 
 
 class Building(NamedTuple):
-    """A grid, and the walls that came with it."""
+    """A grid, and the walls that came with it; they can be measured if it came along how they err together."""
 
     grid: OccupancyGrid
     walls: WallTable | None
@@ -58,12 +58,12 @@ def building_of(path: Path) -> Building:
 
 def _read_building(path: Path, folder: Path) -> Iterator[Building]:
     yaml = _unpacked(path, folder)
-    walls = yaml.with_name(_WALLS)
-    yield Building(read_ros_map(yaml), read_walls_csv(walls) if walls.is_file() else None)
+    has_walls = yaml.with_name(_WALLS).is_file()
+    yield Building(read_ros_map(yaml), read_walls(yaml.parent) if has_walls else None)
 
 
 def _unpacked(path: Path, folder: Path) -> Path:
-    """The only YAML of a zip, unpacked with the images and walls.csv into a folder; other files stay where they are."""
+    """The only YAML of a zip, unpacked with the images and files of walls into a folder; others stay where they are."""
     try:
         with ZipFile(path) as archive:
             parts = [part for part in archive.infolist() if _is_read(Path(part.filename))]
@@ -82,7 +82,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
 
 
 def _is_read(part: Path) -> bool:
-    return part.suffix.lower() in _PARTS or part.name == _WALLS
+    return part.suffix.lower() in _PARTS or part.name in (_WALLS, COVARIANCE_FILE)
 
 
 def _read(path: Path, format: str) -> Iterator[list[Landmark]]:

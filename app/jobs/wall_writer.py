@@ -4,13 +4,16 @@ import zlib
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from lidarcore.errors import MapFileError, UnknownSessionError
 from lidarcore.landmarks import StoredGrid, StoredWall
 from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.walls import WallTable
+from lidarcore.mapping.walls import JointWalls, WallTable, pack_covariance
 
 from .session_writer import SessionWriter
+
+Bools = NDArray[np.bool_]
 
 CONFIRMED = 3  # scans of the map that saw a wall; what fewer saw may have been somebody who stood there
 
@@ -19,18 +22,31 @@ class WallWriter(SessionWriter):
     """Writes the grid and the confirmed walls of a run."""
 
     _written: WallTable | None = None
+    _is_final = False  # of what was written
 
     def write(self, grid: OccupancyGrid, walls: WallTable, *, final: bool) -> None:
-        """Write all of them, unless they are those on the disk. Raises LandmarkMapError."""
+        """Write all of them, unless they are those on the disk; finally how they err together, too.
+
+        Raises LandmarkMapError.
+        """
         confirmed = to_stored(walls)
-        if walls is self._written or (self._map is None and not confirmed):
+        is_there = walls is self._written and (self._is_final or not final)
+        if is_there or (self._map is None and not confirmed):
             return
         try:
-            self._begun().put_walls(confirmed, grid_to_stored(grid))
+            self._begun().put_walls(
+                confirmed, grid_to_stored(grid), covariance_to_stored(walls) if final else None
+            )
         except UnknownSessionError:
             self._map = self._written = None
             raise
-        self._written = walls
+        self._written, self._is_final = walls, final
+
+
+def are_confirmed(walls: WallTable) -> Bools:
+    """Which walls (W,) are kept."""
+    confirmed: Bools = walls.count >= CONFIRMED
+    return confirmed
 
 
 def to_stored(walls: WallTable) -> list[StoredWall]:
@@ -41,8 +57,13 @@ def to_stored(walls: WallTable) -> list[StoredWall]:
         walls.length, walls.length_variance, *walls.ended.astype(int).T, *walls.in_corner.astype(int).T,
         walls.first_seen, walls.last_seen, walls.count,
     ]  # fmt: skip
-    rows = zip(*(column[walls.count >= CONFIRMED].tolist() for column in columns), strict=True)
+    rows = zip(*(column[are_confirmed(walls)].tolist() for column in columns), strict=True)
     return [StoredWall(*row) for row in rows]
+
+
+def covariance_to_stored(walls: WallTable) -> bytes | None:
+    """How the confirmed walls err together; None if nobody knows, or they are more than MOST_WALLS."""
+    return pack_covariance(walls, are_confirmed(walls)) if isinstance(walls, JointWalls) else None
 
 
 def from_stored(walls: Sequence[StoredWall]) -> WallTable:

@@ -159,7 +159,7 @@ class Atlas(Closing):
         with self._database.writing() as connection:
             if not connection.execute("DELETE FROM sessions WHERE id = ?", (session,)).rowcount:
                 raise _unknown(session)
-            for table in ("walls", "grids"):
+            for table in ("walls", "wall_covariances", "grids"):
                 connection.execute(f"DELETE FROM {table} WHERE session = ?", (session,))
         with self._database.reading() as connection:
             left = connection.execute(

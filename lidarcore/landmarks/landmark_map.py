@@ -30,7 +30,13 @@ from lidarcore.landmarks.queries import (
     find,
 )
 from lidarcore.landmarks.stored_grid import StoredGrid, grid_of, replace_grid
-from lidarcore.landmarks.stored_wall import StoredWall, replace_walls, wall_history, walls_of
+from lidarcore.landmarks.stored_wall import (
+    StoredWall,
+    covariance_of,
+    replace_walls,
+    wall_history,
+    walls_of,
+)
 
 _ALL = Filter()
 _IN_SESSION = f"SELECT {SELECTED} FROM landmarks WHERE session = :session"
@@ -78,14 +84,21 @@ class LandmarkMap:
                 remove_landmark(connection, self.session, id)
             return store_landmarks(connection, self.session, landmarks)
 
-    def put_walls(self, walls: Iterable[StoredWall], grid: StoredGrid | None = None) -> None:
+    def put_walls(
+        self,
+        walls: Iterable[StoredWall],
+        grid: StoredGrid | None = None,
+        covariance: bytes | None = None,
+    ) -> None:
         """Store walls, and the grid of the same moment, in place of those that the map has: all or nothing.
+
+        covariance  how the walls err together, as `pack_covariance` gives it; that of earlier walls goes with them
 
         Raises UnknownSessionError if it was deleted.
         """
         with self._database.writing() as connection:
             self._check(connection)
-            replace_walls(connection, self.session, walls)
+            replace_walls(connection, self.session, walls, covariance)
             if grid is not None:
                 replace_grid(connection, self.session, grid)
 
@@ -93,6 +106,11 @@ class LandmarkMap:
         """All walls in the order of their ids."""
         with self._database.reading() as connection:
             return walls_of(connection, self.session)
+
+    def walls_together(self) -> tuple[list[StoredWall], bytes | None]:
+        """All walls in the order of their ids, and how they err together, if that is kept."""
+        with self._database.reading() as connection:
+            return walls_of(connection, self.session), covariance_of(connection, self.session)
 
     def wall_history(self, id: int, after: float = -math.inf, limit: int = 1000) -> list[StoredWall]:
         """States of one wall with last_seen > after (s), oldest first, also of one that is no longer in the map.

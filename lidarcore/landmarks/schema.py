@@ -102,6 +102,9 @@ _MIGRATIONS: tuple[tuple[str, ...], ...] = (
     (  # sessions may have names
         "ALTER TABLE sessions ADD COLUMN name TEXT NOT NULL DEFAULT ''",
     ),
+    (  # how the walls of a finished map err together
+        "CREATE TABLE wall_covariances (session INTEGER PRIMARY KEY, packed BLOB NOT NULL) STRICT",
+    ),
 )
 VERSION = len(_MIGRATIONS)
 

@@ -1,4 +1,4 @@
-"""The walls of a session in the file: as they are now, and each as it was in every second in which it was seen."""
+"""The walls of a session in the file: as they are now, how they err together, and what each was in every second."""
 
 import math
 import sqlite3
@@ -51,8 +51,10 @@ _INSERT = f"INSERT INTO walls (session, {_WALL}) VALUES (?, {_VALUES})"
 _REMEMBER = f"INSERT OR REPLACE INTO wall_history (session, second, wall, {_STATE}) VALUES (?, ?, {_VALUES})"
 
 
-def replace_walls(connection: sqlite3.Connection, session: int, walls: Iterable[StoredWall]) -> None:
-    """Store walls in place of those there are; what differs of a wall is remembered."""
+def replace_walls(
+    connection: sqlite3.Connection, session: int, walls: Iterable[StoredWall], covariance: bytes | None
+) -> None:
+    """Store walls, and how they err together, in place of those there are; what differs of a wall is remembered."""
     before, now = set(walls_of(connection, session)), list(walls)
     connection.execute("DELETE FROM walls WHERE session = ?", (session,))
     connection.executemany(_INSERT, ((session, *astuple(one)) for one in now))
@@ -60,12 +62,22 @@ def replace_walls(connection: sqlite3.Connection, session: int, walls: Iterable[
     connection.executemany(
         _REMEMBER, ((session, math.floor(one.last_seen), *astuple(one)) for one in changed)
     )
+    connection.execute("DELETE FROM wall_covariances WHERE session = ?", (session,))
+    if covariance is not None:
+        connection.execute("INSERT INTO wall_covariances VALUES (?, ?)", (session, covariance))
 
 
 def walls_of(connection: sqlite3.Connection, session: int) -> list[StoredWall]:
     """The walls of a session in the order of their ids."""
     query = f"SELECT {_WALL} FROM walls WHERE session = ? ORDER BY id"
     return [StoredWall(*row) for row in connection.execute(query, (session,))]
+
+
+def covariance_of(connection: sqlite3.Connection, session: int) -> bytes | None:
+    """How the walls of a session err together, if that is kept."""
+    query = "SELECT packed FROM wall_covariances WHERE session = ?"
+    row = connection.execute(query, (session,)).fetchone()
+    return None if row is None else row[0]
 
 
 def wall_history(

@@ -12,7 +12,7 @@ from scipy.sparse import csr_array, vstack
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MeasureError
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.walls import JointWalls
 
 Kind = Literal["wall", "corner"]
 PointsFunction = Callable[[Array, Array], float]
@@ -47,7 +47,7 @@ def feature(name: str) -> Feature:
     raise MeasureError(f"{name!r} does not name a feature: give wall-N or corner-N.")
 
 
-def distance(walls: Walls, first: Feature, second: Feature) -> Measurement:
+def distance(walls: JointWalls, first: Feature, second: Feature) -> Measurement:
     """Between corners: straight. From a corner to a wall: across its line. Between walls: across, on the average.
 
     The distance of two walls is that of the middle of each from the line of the other, the mean of both: for
@@ -56,12 +56,12 @@ def distance(walls: Walls, first: Feature, second: Feature) -> Measurement:
     return _measured(walls, first, second, distance_of)
 
 
-def angle(walls: Walls, first: Feature, second: Feature) -> Measurement:
+def angle(walls: JointWalls, first: Feature, second: Feature) -> Measurement:
     """Between the lines of two walls, from 0 to pi/2. Raises MeasureError if one of them is a corner or unknown."""
     return _measured(walls, first, second, angle_of)
 
 
-def length(walls: Walls, id: int) -> Measurement:
+def length(walls: JointWalls, id: int) -> Measurement:
     """Length of a wall, from end to end; a lower bound where it may go on. Raises MeasureError."""
     index = _place(walls, Feature("wall", id))
     return Measurement(float(walls.length[index]), float(np.sqrt(walls.length_variance[index])))
@@ -82,7 +82,7 @@ def propagated(f: Callable[[Array], float], at: Array, covariance: Array) -> Mea
     return Measurement(abs(f(at)), float(np.sqrt(max(float(J @ covariance @ J), 0.0))))
 
 
-def _measured(walls: Walls, first: Feature, second: Feature, f: PointsFunction) -> Measurement:
+def _measured(walls: JointWalls, first: Feature, second: Feature, f: PointsFunction) -> Measurement:
     check(f, first, second)
     a, b = (_points(walls, one) for one in (first, second))
     rows = csr_array(vstack([_rows(walls, one) for one in (first, second)]))
@@ -93,7 +93,7 @@ def _measured(walls: Walls, first: Feature, second: Feature, f: PointsFunction) 
     )
 
 
-def _place(walls: Walls, one: Feature) -> int:
+def _place(walls: JointWalls, one: Feature) -> int:
     """Where among the walls or the corners it is. Raises MeasureError."""
     known = walls.ids if one.kind == "wall" else np.arange(len(walls.corners))
     found = np.flatnonzero(known == one.index)
@@ -104,13 +104,13 @@ def _place(walls: Walls, one: Feature) -> int:
     return int(found[0])
 
 
-def _points(walls: Walls, one: Feature) -> Array:
+def _points(walls: JointWalls, one: Feature) -> Array:
     """Both ends of a wall, or the corner itself: (2, 2) or (1, 2) m. Raises MeasureError."""
     at = _place(walls, one)
     return walls.ends[at] if one.kind == "wall" else walls.corners.xy[at][None]
 
 
-def _rows(walls: Walls, one: Feature) -> csr_array:
+def _rows(walls: JointWalls, one: Feature) -> csr_array:
     at = _place(walls, one)
     return walls.model.ends_of(at) if one.kind == "wall" else walls.corners.rows_of(at)
 

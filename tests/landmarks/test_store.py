@@ -357,6 +357,26 @@ def test_sessions_of_a_file_of_version_5_have_no_names_until_they_get_one(tmp_pa
         assert atlas.session(1) == before
 
 
+def test_of_walls_of_a_file_of_version_6_it_is_not_known_how_they_err_together_until_it_is_put(tmp_path):
+    """Written by the sixth version, which did not keep that: a session with a name and two walls."""
+    path = shutil.copy(Path(__file__).with_name("version_6.db"), tmp_path / "old.db")
+    with Atlas(path) as atlas:
+        assert atlas.session(1) == Session(1, "hall.mcap", "slam", 1000.0, 1060.0, 0, walls=2, name="Hall")
+        walls, covariance = atlas[1].walls_together()
+        assert [(wall.id, wall.x1) for wall in walls] == [(0, 1.0), (7, 3.0)]
+        assert covariance is None
+        atlas[1].put_walls(walls, covariance=b"together")
+    with Atlas(path) as atlas:
+        assert atlas[1].walls_together() == (walls, b"together")
+        atlas[1].put_walls(walls)
+        assert atlas[1].walls_together() == (walls, None)
+        atlas[1].put_walls(walls, covariance=b"again")
+        atlas.delete(1)
+    with sqlite3.connect(path) as connection:
+        assert connection.execute("SELECT count(*) FROM wall_covariances").fetchone() == (0,)
+    connection.close()
+
+
 def test_a_name_that_cannot_be_shown_or_is_too_long_names_nothing(atlas):
     for name in ("a\tb", "x" * (MAX_NAME + 1)):
         with pytest.raises(LandmarkError, match="The name"):

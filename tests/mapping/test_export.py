@@ -17,7 +17,7 @@ from PIL import Image
 
 from lidarcore import ExtractionSettings, SensorNoise
 from lidarcore.errors import MapFileError, MeasureError
-from lidarcore.mapping.export import MAP_FILES, read_walls_csv, walls_csv, write_map
+from lidarcore.mapping.export import COVARIANCE_FILE, MAP_FILES, read_walls_csv, walls_csv, write_map
 from lidarcore.mapping.grid import build_grid
 from lidarcore.mapping.measure import Feature, angle, distance, feature, length
 from lidarcore.mapping.walls import Walls, WallTable, find_walls, joint_spread
@@ -56,7 +56,7 @@ def folder(tmp_path_factory):
 
 
 def test_all_files_are_there_and_nothing_else(folder):
-    assert {file.name for file in folder.iterdir()} == {*MAP_FILES, "poses.csv"}
+    assert {file.name for file in folder.iterdir()} == {*MAP_FILES, COVARIANCE_FILE, "poses.csv"}
 
 
 def test_the_dxf_passes_the_audit_and_holds_the_walls_in_metres(folder):

@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
 from lidarcore.mapping.grid import OccupancyGrid, shades_of
-from lidarcore.mapping.walls import Walls, WallTable
+from lidarcore.mapping.walls import Walls, WallTable, corner_ends
 
 _MARGIN = 1.0  # m around the plan
 _PIXELS = 1200  # width at which a browser shows it at first
@@ -22,7 +22,8 @@ def corner_places(walls: WallTable) -> Array:
     """Where walls meet (C, 2) m; of a map that was kept, where an end of a wall is a corner."""
     if isinstance(walls, Walls):
         return walls.corners.xy
-    places: Array = np.unique(walls.ends[walls.in_corner].round(6), axis=0)
+    at, side = corner_ends(walls).T
+    places: Array = walls.ends[at, side]
     return places
 
 

@@ -10,10 +10,10 @@ from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
 from lidarcore.files import replacing_all
 from lidarcore.mapping.export.drawings import corner_places, map_png, plan_dxf, plan_svg
-from lidarcore.mapping.export.tables import walls_csv, walls_geojson
+from lidarcore.mapping.export.tables import read_walls_csv, walls_csv, walls_geojson
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.grid.ros_map import ros_pgm, ros_yaml
-from lidarcore.mapping.walls import WallTable
+from lidarcore.mapping.walls import JointWalls, WallTable, pack_covariance, unpack_covariance
 
 MAP_FILES: dict[str, Callable[[OccupancyGrid, WallTable, Array], bytes]] = {
     "map.pgm": lambda grid, walls, path: ros_pgm(grid),
@@ -25,6 +25,22 @@ MAP_FILES: dict[str, Callable[[OccupancyGrid, WallTable, Array], bytes]] = {
     "map.png": map_png,
 }
 """The files of a map by name, and what makes each of grid, walls and the path (T, 2) m of the sensor."""
+COVARIANCE_FILE = "walls_covariance.bin"
+"""How the walls of walls.csv err together, as `pack_covariance` gives it, if that is known of so many."""
+
+
+def read_walls(folder: str | Path) -> WallTable:
+    """The walls of a folder of a map, which can be measured if COVARIANCE_FILE is there.
+
+    Raises MapFileError, which names what is wrong, if walls.csv or that file cannot be read.
+    """
+    walls, path = read_walls_csv(Path(folder) / "walls.csv"), Path(folder) / COVARIANCE_FILE
+    if not path.is_file():
+        return walls
+    try:
+        return unpack_covariance(path.read_bytes(), walls)
+    except (OSError, MapFileError) as error:
+        raise MapFileError(f"{path.name}: {error} Without this file the walls can be read.") from error
 
 
 def write_map(
@@ -36,22 +52,28 @@ def write_map(
 ) -> None:
     """Write MAP_FILES into a folder, which is made if need be; what was there under these names is replaced.
 
+    With walls that can be measured COVARIANCE_FILE is written, too; of others it is not there.
+
     path   (T, 2) or (T, 3) m: where the sensor was, for the pictures
     texts  further text files by name, such as poses.csv
 
     Raises MapFileError if a file cannot be written; the folder is as it was then.
     """
-    folder, texts = Path(folder), texts or {}
+    folder, packed = Path(folder), pack_covariance(walls) if isinstance(walls, JointWalls) else None
+    others = {name: text.encode() for name, text in (texts or {}).items()}
+    others |= {} if packed is None else {COVARIANCE_FILE: packed}
     poses = np.asarray(path, np.float64)
     way = poses[:, :2] if len(poses) else np.empty((0, 2))
     made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with replacing_all(*(folder / name for name in (*MAP_FILES, *texts))) as parts:
+        with replacing_all(*(folder / name for name in (*MAP_FILES, *others))) as parts:
             for content_of, part in zip(MAP_FILES.values(), parts, strict=False):
                 part.write_bytes(content_of(grid, walls, way))
-            for text, part in zip(texts.values(), parts[len(MAP_FILES) :], strict=True):
-                part.write_text(text, "utf-8", newline="")
+            for content, part in zip(others.values(), parts[len(MAP_FILES) :], strict=True):
+                part.write_bytes(content)
+        if packed is None:
+            (folder / COVARIANCE_FILE).unlink(missing_ok=True)
     except OSError as error:
         if made and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()

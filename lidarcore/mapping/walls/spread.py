@@ -4,9 +4,10 @@ A spread takes M (R, 3 K), by which R quantities move with the poses, and gives 
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
 from lidarcore.arrays import Array
@@ -38,12 +39,14 @@ def joint_spread(covariance: ArrayLike) -> Spread:
     if C.ndim != 2 or C.shape[0] != C.shape[1] or C.shape[0] % 3 or not np.isfinite(C).all():
         raise CovarianceError(f"The covariance has shape {C.shape}: give (3 K, 3 K), all finite.")
 
-    def spread(M: csr_array) -> Array:
-        columns = np.unique(M.indices)
-        dense = M[:, columns].toarray()
-        return dense @ C[np.ix_(columns, columns)] @ dense.T
+    return partial(spread_by, C)
 
-    return spread
+
+def spread_by(covariance: NDArray[np.floating], M: csr_array) -> Array:
+    """M C M^T (R, R) of a covariance (N, N) and a sparse M (R, N)."""
+    columns = np.unique(M.indices)
+    dense: Array = M[:, columns].toarray()
+    return dense @ covariance[np.ix_(columns, columns)] @ dense.T
 
 
 def _roots(C: Array) -> Array:

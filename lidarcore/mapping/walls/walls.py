@@ -12,53 +12,40 @@ from lidarcore.mapping.grid.occupancy import OccupancyGrid
 from lidarcore.mapping.walls.ends import find_end
 from lidarcore.mapping.walls.grouping import group_pieces
 from lidarcore.mapping.walls.intersections import Intersections, find_intersections
+from lidarcore.mapping.walls.joint import Corners, JointWalls
 from lidarcore.mapping.walls.model import WallModel, corner_rows, wall_model
 from lidarcore.mapping.walls.observations import Observations
 from lidarcore.mapping.walls.parts import Part, find_parts
 from lidarcore.mapping.walls.pieces import collect_pieces
 from lidarcore.mapping.walls.settings import WallSettings
 from lidarcore.mapping.walls.spread import Spread, common_spread
-from lidarcore.mapping.walls.table import WallTable
 from lidarcore.scan import Scan
 from lidarcore.settings import ExtractionSettings
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WallCorners:
-    """C corners where walls meet.
+class WallCorners(Corners):
+    """C corners where walls meet; `rows` (2 C, 4 W) are of what was estimated of walls, for `WallModel.covariance`.
 
-    xy          (C, 2) m
     covariance  (C, 2, 2) m²
     walls       (C, 2) which two, by their place among the walls
-    rows        (2 C, 4 W) how they follow from what was estimated of walls, for `WallModel.covariance`
     """
 
-    xy: Array
     covariance: Array
     walls: Ints
-    rows: csr_array = field(repr=False)
-
-    def __len__(self) -> int:
-        return len(self.xy)
-
-    def rows_of(self, k: int) -> csr_array:
-        """Rows (2, 4 W) of one corner."""
-        return self.rows[2 * k : 2 * k + 2]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Walls(WallTable):
-    """The walls of a map, and what they have in common.
+class Walls(JointWalls):
+    """The walls of a map as they were found, and what they have in common.
 
     end_covariance  (W, 4, 4) of both ends, x and y; along the wall it means nothing where `ended` is false
-    corners         where walls meet
-    model           what the covariances come from, for what walls have in common
     observations    what of which segments each wall was seen by
     """
 
-    end_covariance: Array
     corners: WallCorners
     model: WallModel = field(repr=False)
+    end_covariance: Array
     observations: Observations = field(repr=False)
 
     def __repr__(self) -> str:
@@ -112,9 +99,9 @@ def find_walls(
         np.array([stamps[k].min() for k in seen]),
         np.array([stamps[k].max() for k in seen]),
         np.array([len(k) for k in seen], np.int64),
-        covariances[:, 2:, 2:],
         _corners(parts, intersections, model),
         model,
+        covariances[:, 2:, 2:],
         Observations.of(pieces, parts, numbers),
     )
 
@@ -140,7 +127,7 @@ def _corners(parts: list[Part], intersections: Intersections, model: WallModel) 
     first = np.sort(first)
     walls, xy = intersections.walls[first], intersections.xy[first]
     if not len(walls):
-        return WallCorners(xy, np.empty((0, 2, 2)), walls, csr_array((0, 4 * len(parts))))
+        return WallCorners(xy, csr_array((0, 4 * len(parts))), np.empty((0, 2, 2)), walls)
     rows = [corner_rows(parts, int(i), int(j), at) for (i, j), at in zip(walls, xy, strict=True)]
     stacked = csr_array(vstack(rows))
-    return WallCorners(xy, model.of_points(stacked), walls, stacked)
+    return WallCorners(xy, stacked, model.of_points(stacked), walls)
