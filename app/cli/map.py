@@ -42,7 +42,8 @@ def map_recording(
 ) -> None:
     """A map of where a recording was taken, from whole scans: grid, walls, floor plans, and poses with covariances.
 
-    The folder gets map.pgm and map.yaml (ROS), walls.csv and walls.geojson, plan.svg and plan.dxf, map.png, poses.csv.
+    The folder gets map.pgm and map.yaml (ROS), walls.csv, walls.geojson and walls_covariance.bin, plan.svg and
+    plan.dxf, map.png, poses.csv.
     """
     from lidarcore import open_recording
 

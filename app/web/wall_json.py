@@ -7,9 +7,11 @@ import numpy as np
 from pydantic_core import to_json
 from typing_extensions import TypedDict
 
-from lidarcore.mapping.walls import Walls, WallTable
+from lidarcore.mapping.walls import Walls, WallTable, corner_ends
 
 from .schemas import Matrix, Pair
+
+SAME = 1e-6  # m, between ends that are the same corner
 
 
 class WallJson(TypedDict):
@@ -36,17 +38,20 @@ class WallJson(TypedDict):
 
 
 def walls_text(walls: WallTable | None) -> str:
-    """The walls of a map, and the corners where two of them meet, with the ids of both; none where there is no map.
-
-    Of a map that is kept it is not known which walls meet.
-    """
+    """The walls of a map, and the corners where they meet, with ids of these; none where there is no map."""
     if walls is None:
         return to_json({"walls": [], "corners": []}).decode()
-    met = []
+    corners = [{"at": at, "walls": met} for at, met in _corners(walls)]
+    return to_json({"walls": wall_rows(walls, range(len(walls))), "corners": corners}).decode()
+
+
+def _corners(walls: WallTable) -> Iterable[tuple[list[float], list[int]]]:
+    """Where walls meet, and the ids of both; of a map that is kept, of those that end there."""
     if isinstance(walls, Walls):
-        corners = zip(walls.corners.xy.tolist(), walls.ids[walls.corners.walls].tolist(), strict=True)
-        met = [{"at": at, "walls": pair} for at, pair in corners]
-    return to_json({"walls": wall_rows(walls, range(len(walls))), "corners": met}).decode()
+        return zip(walls.corners.xy.tolist(), walls.ids[walls.corners.walls].tolist(), strict=True)
+    spots = walls.ends[tuple(corner_ends(walls).T)]
+    meet = [(walls.in_corner & (np.abs(walls.ends - at) < SAME).all(-1)).any(-1) for at in spots]
+    return zip(spots.tolist(), (walls.ids[some].tolist() for some in meet), strict=True)
 
 
 def wall_rows(walls: WallTable, chosen: Iterable[int]) -> list[WallJson]:

@@ -56,8 +56,8 @@ function endText({ ends, ended, in_corner: inCorner }, at) {
 /** To the walls that it meets in corners. */
 function waysAround({ id }) {
   const met = get("mapped").corners.filter(({ walls }) => walls.includes(id));
-  const others = met.map(({ walls: [one, other] }) => mappedWall(one === id ? other : one));
-  return others.map((wall) => [`Wall W${wall.id}, ${metres(wall.length)}\u2009m`, () => selectMapped(wall.id)]);
+  const others = met.flatMap(({ walls }) => walls.filter((other) => other !== id));
+  return others.map(mappedWall).map((wall) => [`Wall W${wall.id}, ${metres(wall.length)}\u2009m`, () => selectMapped(wall.id)]);
 }
 
 /** To what the scan sees of it. */

@@ -1,8 +1,22 @@
 """Measuring in the current frame and in its map: the room's own measures, with sigmas, and what cannot be measured."""
 
+import io
+import shutil
+import sqlite3
+from contextlib import closing
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from zipfile import ZipFile
+
 import numpy as np
 import pytest
-from serving import CORNERS, Server, assert_problem, write_room
+from lidarcore_app.jobs.landmark_store import LandmarkStore
+from lidarcore_app.jobs.wall_writer import CONFIRMED
+from serving import CORNERS, Json, Server, assert_problem, wait_until, write_room
+
+from lidarcore.mapping.export import COVARIANCE_FILE
+from lidarcore.mapping.walls import MOST_WALLS
 
 WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
 MIDDLES = (CORNERS + np.roll(CORNERS, -1, axis=0)) / 2
@@ -99,3 +113,129 @@ def test_scan_and_map_are_not_mixed_and_without_a_map_nothing_of_it_is_measured(
     mapped.play(room, paused=True)
     params = {"first": at("map-corner", corner), "second": at("map-corner", other)}
     assert "slam" in assert_problem(mapped.http.get("/measure", params=params), 404)["detail"]
+
+
+def between(server: Server, first: str, second: str, **asked: int) -> Json:
+    return server.get("/measure", first=first, second=second, **asked)
+
+
+def refused(server: Server, status: int, **asked: int) -> str:
+    two = {"first": at("map-wall", MIDDLES[0]), "second": at("map-wall", MIDDLES[2])}
+    return assert_problem(server.http.get("/measure", params=two | asked), status)["detail"]
+
+
+def all_measured(server: Server, **asked: int) -> dict[tuple[str, str], Json]:
+    """Between all corners and walls of the room."""
+    places = [at("map-corner", xy) for xy in CORNERS] + [at("map-wall", xy) for xy in MIDDLES]
+    return {pair: between(server, *pair, **asked) for pair in combinations(places, 2)}
+
+
+def assert_same(found: dict[tuple[str, str], Json], truth: dict[tuple[str, str], Json]) -> None:
+    """Corners have no ids that last, and the ends of walls that meet are the same to rounding."""
+    for pair, told in truth.items():
+        names = (
+            ("distance", "sigma") if told["angle"] is None else ("distance", "sigma", "angle", "angle_sigma")
+        )
+        assert [found[pair][name] for name in names] == pytest.approx(
+            [told[name] for name in names], rel=1e-3, abs=1e-5
+        )
+        for side in ("first", "second"):
+            assert found[pair][side]["at"] == pytest.approx(told[side]["at"], abs=1e-6)
+            if told[side]["kind"] == "map-wall":
+                assert found[pair][side]["id"] == told[side]["id"]
+
+
+@pytest.fixture
+def finished(server: Server) -> tuple[Server, int, dict[tuple[str, str], Json]]:
+    """A map, its session, and what was measured in it as the last thing before it was finished."""
+
+    def told(**asked: int) -> list[Json]:
+        answer = server.http.get("/walls", params=asked)
+        return answer.json()["walls"] if answer.is_success else []
+
+    server.change("PATCH", "/settings", WHOLE_SCANS)
+    server.play(write_room(server.folder / "long.npz", scans=600))
+    wait_until(lambda: [wall["count"] >= CONFIRMED for wall in told()] == 4 * [True], "all are confirmed", 60)
+    server.change("PATCH", "/source", {"state": "paused"})
+    wait_until(lambda: server.get("/sessions")["store"]["session"] is not None, "the map is kept")
+    session = server.get("/sessions")["store"]["session"]
+    wait_until(lambda: told(session=session) == told(), "all of it is on the disk")
+    assert "still being made: leave out session" in refused(server, 404, session=session)
+    truth = all_measured(server)
+    server.change("PATCH", "/settings", {"navigation": {"mode": "off"}})
+    wait_until(lambda: server.get("/sessions")["sessions"][-1]["ended"] is not None, "it is finished")
+    return server, session, truth
+
+
+def test_a_finished_map_is_measured_as_before_wherever_it_is(finished, tmp_path: Path) -> None:
+    """By its session, where it is localized in, and loaded from its zip; and once the server was killed."""
+    server, session, truth = finished
+    assert "give the session of one that is kept" in refused(server, 404)
+    assert_same(all_measured(server, session=session), truth)
+    server.change("PUT", "/localization/map", {"session": session})
+    server.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
+    wait_until(lambda: server.get("/localization")["session"] == session, "it is localized in")
+    assert_same(all_measured(server), truth)
+
+    packed = server.http.get("/map", params={"session": session, "format": "zip"}).raise_for_status().content
+    loaded = (
+        server.http.post("/map", params={"format": "zip"}, content=packed).raise_for_status().json()["id"]
+    )
+    assert_same(all_measured(server, session=loaded), truth)
+    assert_same(all_measured(server, session=session), truth)
+
+    path = Path(server.get("/sessions")["store"]["path"])
+    for part in path.parent.glob(f"{path.name}*"):  # as it is on the disk while the server goes on
+        shutil.copy(part, tmp_path / part.name)
+    with closing(LandmarkStore(tmp_path / path.name)) as store:
+        assert store.joint_walls(session) is not None
+
+
+def test_a_map_of_which_it_is_not_known_is_refused_with_the_reason(finished) -> None:
+    server, session, _ = finished
+    for one, other in (("corner@1,1", "corner@2,2"), ("wall@1,1", "corner@2,2")):
+        params = {"first": one, "second": other, "session": session}
+        assert (
+            "leave out session" in assert_problem(server.http.get("/measure", params=params), 422)["detail"]
+        )
+    assert_problem(
+        server.http.get("/measure", params={"first": "map-wall:1", "second": "map-wall:2", "session": "x"}),
+        422,
+    )
+    assert "no session 99" in refused(server, 404, session=99)
+    assert_problem(
+        server.http.get("/measure", params={"first": "map-wall:1", "second": "map-wall:2", "session": 2**70}),
+        422,
+    )
+
+    files = server.http.get("/map", params={"session": session, "format": "zip"}).raise_for_status().content
+    bare, damaged = (without_covariance(files, more) for more in ({}, {COVARIANCE_FILE: b"nonsense"}))
+    loaded = server.http.post("/map", params={"format": "zip"}, content=bare).raise_for_status().json()["id"]
+    assert f"loaded without {COVARIANCE_FILE}" in refused(server, 404, session=loaded)
+    before = server.get("/sessions")["sessions"]
+    problem = assert_problem(server.http.post("/map", params={"format": "zip"}, content=damaged), 422)
+    assert f"{COVARIANCE_FILE}: " in problem["detail"]
+    assert server.get("/sessions")["sessions"] == before
+
+    store = server.app.state.server.landmarks
+    walls = store.atlas[session].walls()
+    empty = store.atlas.begin("empty", 1.0)
+    assert "has no walls" in refused(server, 404, session=empty.session)
+    empty.put_walls([replace(walls[0], id=id) for id in range(MOST_WALLS + 1)])
+    assert f"more than {MOST_WALLS} walls" in refused(server, 404, session=empty.session)
+    with closing(sqlite3.connect(server.get("/sessions")["store"]["path"])) as file, file:
+        file.execute(
+            "UPDATE wall_covariances SET packed = substr(packed, 1, 40) WHERE session = ?", (session,)
+        )
+    assert "is damaged" in refused(server, 422, session=session)
+    assert len(server.get("/walls", session=session)["walls"]) == len(walls)
+
+
+def without_covariance(packed: bytes, more: dict[str, bytes]) -> bytes:
+    """A zip without that file, but with more."""
+    file = io.BytesIO()
+    with ZipFile(io.BytesIO(packed)) as before, ZipFile(file, "w") as after:
+        kept = {name: before.read(name) for name in before.namelist() if name != COVARIANCE_FILE}
+        for name, content in (kept | more).items():
+            after.writestr(name, content)
+    return file.getvalue()

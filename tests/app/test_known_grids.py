@@ -17,7 +17,7 @@ from serving import Server, assert_problem, wait_until
 
 from lidarcore import Scan
 from lidarcore.geometry import compose
-from lidarcore.mapping.export import MAP_FILES, walls_csv, write_map
+from lidarcore.mapping.export import COVARIANCE_FILE, MAP_FILES, walls_csv, write_map
 from lidarcore.mapping.grid import OccupancyGrid, build_grid, read_ros_map, shades_of, write_ros_map
 from lidarcore.mapping.walls import find_walls
 from lidarcore.recordings.writer import RecordingWriter
@@ -128,10 +128,13 @@ def test_walls_of_a_map_that_is_loaded_again_are_localized_in_and_saved(
     np.testing.assert_allclose([wall["end"] for wall in told], walls.ends[kept, 1], rtol=1e-8)
     with driving.stream() as stream:
         assert stream.until("walls", bool)["walls"] == told
-    for path, query in (("/map", {"session": session["id"]}), ("/map/grid", {})):
+    for path, query, more in (
+        ("/map", {"session": session["id"]}, {COVARIANCE_FILE}),
+        ("/map/grid", {}, set()),
+    ):
         back = driving.http.get(path, params=query | {"format": "zip"}).raise_for_status()
         with ZipFile(io.BytesIO(back.content)) as archive:
-            assert set(archive.namelist()) == set(MAP_FILES)
+            assert set(archive.namelist()) == {*MAP_FILES, *more}
             assert archive.read("walls.csv").decode() == walls_csv(walls, kept)
 
 

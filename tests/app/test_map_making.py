@@ -9,11 +9,12 @@ from zipfile import ZipFile
 
 import numpy as np
 import psutil
+import pytest
 from serving import Json, Server, assert_problem, wait_until
 from two_lidars import write_two_lidars
 
 from lidarcore.geometry import pose_difference, relative
-from lidarcore.mapping.export import MAP_FILES
+from lidarcore.mapping.export import COVARIANCE_FILE, MAP_FILES
 from lidarcore.recordings.writer import RecordingWriter
 from lidarcore.scan import Array
 from lidarcore.simulation.robot import SimulatedRobot
@@ -69,9 +70,18 @@ def test_a_map_of_a_recording_becomes_a_session_and_files_with_honest_poses(serv
     assert session["grid"]
     assert len(server.get("/walls", session=made["session"])["walls"]) == session["walls"] > 5
 
+    walls = server.get("/walls", session=made["session"])["walls"]
+    longest, *others = sorted(walls, key=lambda wall: -wall["length"])
+    for other in others[:4]:
+        two = {"first": f"map-wall:{longest['id']}", "second": f"map-wall:{other['id']}"}
+        told = server.get("/measure", **two, session=made["session"])
+        between = abs((longest["alpha"] - other["alpha"] + np.pi / 2) % np.pi - np.pi / 2)
+        assert told["angle"] == pytest.approx(between, abs=1e-6)
+        assert 0 < told["angle_sigma"] < 0.01
+
     answer = server.http.get(f"{MAKING}/files").raise_for_status()
     with ZipFile(io.BytesIO(answer.content)) as archive:
-        assert set(archive.namelist()) == {*MAP_FILES, "poses.csv"}
+        assert set(archive.namelist()) == {*MAP_FILES, COVARIANCE_FILE, "poses.csv"}
         rows = list(csv.DictReader(io.StringIO(archive.read("poses.csv").decode())))
     poses = np.array([[float(row[name]) for name in ("x", "y", "heading")] for row in rows])
     off = pose_difference(poses, truth)

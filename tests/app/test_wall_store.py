@@ -2,6 +2,7 @@
 
 import io
 import math
+import shutil
 import sqlite3
 from collections.abc import Callable
 from contextlib import closing
@@ -19,6 +20,7 @@ from processes import Serving
 from serving import ROBOT, Server, assert_problem, write_room
 from waiting import wait_until
 
+from lidarcore import SensorNoise
 from lidarcore.errors import (
     LandmarkError,
     LandmarkMapError,
@@ -27,8 +29,11 @@ from lidarcore.errors import (
     UnknownWallError,
 )
 from lidarcore.landmarks import Atlas, StoredWall
-from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.walls import WallTable
+from lidarcore.mapping.grid import OccupancyGrid, build_grid
+from lidarcore.mapping.measure import Feature, Measurement, angle
+from lidarcore.mapping.walls import Walls, WallTable, find_walls
+from lidarcore.simulation import SimulatedSensor
+from lidarcore.simulation.rooms import rectangular_room
 
 WHOLE_SCANS = {"navigation": {"mode": "slam", "method": "scans"}}
 
@@ -236,6 +241,53 @@ def test_the_grid_of_a_run_is_kept_with_its_walls(tmp_path: Path) -> None:
             store.grid(1)
     with closing(sqlite3.connect(tmp_path / "maps.db")) as file:
         assert file.execute("SELECT count(*) FROM grids").fetchone() == (0,)
+
+
+@pytest.fixture(scope="module")
+def found() -> Walls:
+    """The walls of a room, of which only the first two were seen often enough."""
+    pose, sensor = np.zeros(3), SimulatedSensor(rectangular_room(6, 4), SensorNoise(0.01, 0.001))
+    scans = [sensor.scan(pose, np.random.default_rng(seed), float(seed))[0] for seed in range(4)]
+    poses, spread = np.zeros((4, 3)), np.tile(np.diag([1e-4, 1e-4, 1e-6]), (4, 1, 1))
+    walls = find_walls(scans, poses, spread, build_grid(scans, poses))
+    count = np.where(np.arange(len(walls)) < 2, walls.count, CONFIRMED - 1)
+    return replace(walls, count=count)
+
+
+def test_how_walls_err_together_is_kept_once_their_map_is_finished(tmp_path: Path, found: Walls) -> None:
+    path, two = tmp_path / "maps.db", [Feature("wall", id) for id in found.ids[:2].tolist()]
+    truth = angle(found, *two)
+
+    def measured(store: LandmarkStore, session: int | None) -> Measurement | None:
+        assert session is not None
+        joint = store.joint_walls(session)
+        return joint and angle(joint, *two)
+
+    with closing(LandmarkStore(path)) as store:
+        run = store.begin_walls("room.mcap")
+        run.put(GRID, found)
+        wait_until(lambda: run.session == 1 and store.status.behind_s == 0)
+        assert measured(store, 1) is None
+        store.settle()  # nothing else has changed since
+        for _ in range(2):
+            kept = measured(store, 1)
+            assert kept is not None
+            assert (kept.value, kept.sigma) == pytest.approx((truth.value, truth.sigma), rel=1e-4)
+            run.put(GRID, found)  # once more, as when the last map comes after the end
+            wait_until(lambda: store.status.behind_s == 0)
+        run.put(GRID, replace(found))  # others that are the same
+        wait_until(lambda: store.status.behind_s == 0)
+        assert measured(store, 1) == kept
+        for part in tmp_path.glob("maps.db*"):  # as a server that is killed now leaves it
+            shutil.copy(part, tmp_path / part.name.replace("maps", "killed"))
+        run.put(GRID, walls(stored(0)))  # of these nobody knows
+        wait_until(lambda: store.status.behind_s == 0)
+        assert measured(store, 1) is None
+    with closing(LandmarkStore(tmp_path / "killed.db")) as store:
+        assert measured(store, 1) == kept
+        store.atlas.delete(1)
+    with closing(sqlite3.connect(tmp_path / "killed.db")) as file:
+        assert file.execute("SELECT count(*) FROM wall_covariances").fetchone() == (0,)
 
 
 def test_a_map_that_is_deleted_while_it_grows_begins_again(tmp_path: Path) -> None:

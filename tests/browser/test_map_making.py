@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 from collections.abc import Callable
 from zipfile import ZipFile
 
@@ -41,8 +42,36 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     expect(row).to_contain_text(f"{len(kept)} walls")
     expect(row.locator(".entry span")).to_have_text("emulated-s1")
     expect(page.get_by_role("button", name="Clear")).to_be_disabled()  # it has no landmarks
+    measure_as_rest_does(visitor, session)
     server.patch("settings", {"navigation": None})
     server.api.delete(f"sessions/{session}").raise_for_status()
+
+
+def measure_as_rest_does(visitor: Visitor, session: int) -> None:
+    """From a corner of the map that is localized in to a wall elsewhere; cards of its own walls are linked."""
+    page, told = visitor.page, visitor.knows("mapped")
+    corner = next(one for one in told["corners"] if len(one["walls"]) > 1)
+    ids = {wall["id"] for wall in told["walls"]}
+    assert {id for one in told["corners"] for id in one["walls"]} <= ids
+    away = [wall for wall in told["walls"] if wall["id"] not in corner["walls"]]
+    wall = max(away, key=lambda one: one["length"])
+    (u, v), (x, y) = corner["at"], [0.6 * a + 0.4 * b for a, b in zip(*wall["ends"], strict=True)]
+    page.keyboard.press("d")
+    for place in ((u, v), (x, y)):
+        page.mouse.click(*visitor.pixel_at([*place]))
+        page.wait_for_timeout(200)
+    asked = f"measure?first=map-corner@{u:.4f},{v:.4f}&second=map-wall:{wall['id']}"
+    found = visitor.server.get(asked)
+    assert found == visitor.server.get(f"{asked}&session={session}")
+    said = f"^{found['distance']:.3f}.m ± {1e3 * found['sigma']:.1f}.mm$"
+    expect(page.locator("#measure-text")).to_have_text(re.compile(said))
+    page.keyboard.press("d")
+    one, other = corner["walls"][:2]
+    page.get_by_role("button", name=f"W{one}", exact=True).click()
+    card = page.get_by_role("complementary", name="Inspector")
+    card.get_by_role("button", name=f"Wall W{other},").click()
+    expect(card.get_by_role("heading", name=f"Wall W{other} of the map")).to_be_visible()
+    page.keyboard.press("Escape")
 
 
 @pytest.mark.parametrize(("width", "theme"), [(1400, "light"), (390, "dark")])

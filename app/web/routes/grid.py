@@ -13,7 +13,7 @@ from PIL import Image
 from starlette.responses import Response
 
 from lidarcore.mapping import MapPicture
-from lidarcore.mapping.export import MAP_FILES, write_map
+from lidarcore.mapping.export import write_map
 from lidarcore.mapping.grid import OccupancyGrid, shades_of
 from lidarcore.mapping.walls import WallTable
 
@@ -21,6 +21,7 @@ from ...errors import NotFoundError
 from ...pipeline.runtime import Runtime
 from ..openapi import MEDIA_TYPES
 from ..problems import documented
+from ..state import State
 from .dependencies import Server
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422))
@@ -37,6 +38,13 @@ def running_picture(runtime: Runtime) -> MapPicture:
         return found
     makes_one = wanted.mode == "slam" and wanted.method == "scans"
     raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
+
+
+def asked_session(server: State, session: int | None) -> int | None:
+    """The kept map that is meant: the given one, else that which is localized in; None for that which is made."""
+    if session is None and server.runtime.settings.navigation.mode == "localize":
+        return server.runtime.navigation.session
+    return session
 
 
 def running_walls(runtime: Runtime) -> WallTable:
@@ -78,8 +86,8 @@ def _zip(grid: OccupancyGrid, walls: WallTable) -> Response:
     file = io.BytesIO()
     with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder, ZipFile(file, "w") as archive:
         write_map(folder, grid, walls)
-        for name in MAP_FILES:
-            archive.write(Path(folder) / name, name)
+        for part in sorted(Path(folder).iterdir()):
+            archive.write(part, part.name)
     return Response(file.getvalue(), media_type=MEDIA_TYPES["zip"])
 
 

@@ -105,7 +105,7 @@ async def upload(
         Literal["json", "csv", "geojson", "zip"] | None,
         Query(
             description="of the body, by its Content-Type or else JSON if not given; zip: a grid, map.yaml with its "
-            "image as ROS and `lidarcore map` write them, and walls.csv if it is there"
+            "image as ROS and `lidarcore map` write them, and walls.csv and walls_covariance.bin if they are there"
         ),
     ] = None,
     name: Annotated[
@@ -156,7 +156,9 @@ def _write(landmarks: LandmarkStore, landmark_map: LandmarkMap, path: Path, reso
     if format in PLANS:
         path.write_text(_plan(landmarks.walls(session), session, format), "utf-8")
     elif format in PICTURES:
-        _draw(landmark_map, landmarks.grid(session), landmarks.walls(session), path, resolution)
+        joint = landmarks.joint_walls(session) if format == "zip" else None
+        walls = landmarks.walls(session) if joint is None else joint
+        _draw(landmark_map, landmarks.grid(session), walls, path, resolution)
     else:
         _check_landmarks(landmarks.atlas.session(session))
         export_map(landmark_map, path)

@@ -1,74 +1,38 @@
 """Distances and angles between walls and corners, of a scan or of the map, with their standard deviations."""
 
-import re
-from typing import Annotated, Literal, NamedTuple, cast
+from typing import Annotated
 
-import numpy as np
 from fastapi import APIRouter, Query
-from pydantic import AfterValidator
 from typing_extensions import TypedDict
 
-from lidarcore import Array
-from lidarcore.geometry import act
 from lidarcore.mapping import measure as of_map
 from lidarcore.mapping import scan_measure as of_scan
-from lidarcore.mapping.measure import Feature
-from lidarcore.mapping.walls import Walls
+from lidarcore.mapping.export import COVARIANCE_FILE
+from lidarcore.mapping.walls import MOST_WALLS, JointWalls
 
 from ...errors import NotFoundError
-from ...pipeline.frame import Frame
+from ...jobs.landmark_store import LandmarkStore
+from ..places import MeasuredFeatureJson, Place, found_at
 from ..problems import ProblemError, documented
-from ..schemas import Pair
-from .dependencies import CurrentFrame
+from ..state import State
+from .dependencies import Server
+from .grid import asked_session
 
 router = APIRouter(prefix="/measure", tags=["frame"], responses=documented(404, 422, 503))
 
-SNAP = 0.3  # m; what is farther away was not meant
 MIXED = "One place is of the scan, the other of the map: give two of the scan, or two of the map."
+OF_SCAN = "Both places are of the scan: leave out session, or give places of the map, such as map-wall:7."
 NO_WALLS = (
-    "No map is being made whose walls can be measured: set navigation.mode to slam and navigation.method to scans, and "
-    "wait. A map that is kept does not say how its walls err together."
+    "No map is shown whose walls can be measured: give the session of one that is kept, or set navigation.mode to slam "
+    "and navigation.method to scans, and wait."
 )
-
-_Candidates = tuple[list[Feature], list[int], Array]  # each with its id, and its place (N, 2) m that is meant
-
-_PLACE = r"^((map-)?(corner|wall)@-?\d{1,6}(\.\d{1,12})?,-?\d{1,6}(\.\d{1,12})?|map-wall:\d{1,18})$"
-
-
-def _place(text: str) -> str:
-    if not re.search(_PLACE, text):
-        raise ValueError(
-            f"{text!r} is no place: write corner@x,y, wall@x,y, map-corner@x,y or map-wall@x,y, x and y in metres, or "
-            "map-wall:ID, the id as /walls gives it"
-        )
-    return text
-
-
-Place = Annotated[
-    str,
-    AfterValidator(_place),
-    Query(
-        json_schema_extra={"pattern": _PLACE},
-        description="corner@x,y or wall@x,y: the nearest of the scan to a place, m, in the frame of the map or of the "
-        "sensor; map-corner@x,y or map-wall@x,y: of the map of whole scans; map-wall:ID: its wall with that id, as "
-        "/walls gives it",
-        examples=["corner@3.1,1.99", "map-wall:7"],
-    ),
-]
-
-
-Kind = Literal["corner", "wall", "map-corner", "map-wall"]
-
-
-class MeasuredFeatureJson(TypedDict):
-    """`id` of a corner as frames have it, of a wall its number in this frame, of a wall of the map its id; `at`, the
-    place on it, m, of a wall that was named by its id its middle. Corners of the map have no ids that last: theirs is
-    the number among them now.
-    """
-
-    kind: Kind
-    id: int
-    at: Pair
+BEING_MADE = "Map {} is still being made: leave out session to measure it as it is now."
+BARE = "Map {} has no walls that can be measured: give the session of a map of whole scans."
+TOO_MANY = "Map {} has more than {} walls: of so many it is not kept how they err together."
+NOT_JOINT = (
+    "A map that is kept can be measured if it is known how its walls err together, and of map {} it is not: its making "
+    "was not finished, an older version kept it, or it was loaded without {}. Make it once more of its recording."
+)
 
 
 class MeasureJson(TypedDict):
@@ -82,32 +46,42 @@ class MeasureJson(TypedDict):
     angle_sigma: float | None
 
 
-class _Found(NamedTuple):
-    feature: Feature
-    said: MeasuredFeatureJson
-
-
 @router.get("", response_description="The distance, and the angle between walls")
-def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
-    """How far two corners or walls of the current frame, or of its map, are from each other, and how sure that is.
+def measure(
+    server: Server,
+    first: Place,
+    second: Place,
+    session: Annotated[
+        int | None,
+        Query(
+            description="a map that is kept; if not given, places of the map are of the one that is made, or localized "
+            "in, now"
+        ),
+    ] = None,
+) -> MeasureJson:
+    """How far two corners or walls of the current frame, or of a map, are from each other, and how sure that is.
 
     From a corner to a wall: across its line; between walls: across, on the average, which says nothing of walls that
     are not about parallel: their `angle` tells. 404 if nothing is near a place, no wall has the id, or both
     places name the same thing; 422 if one is of the scan and the other of the map, which err together in ways that
-    nobody knows.
+    nobody knows. Maps that are kept can be measured once they are finished, if they have at most 1,000 walls;
+    404 says why another one cannot.
     """
     if first.startswith("map-") != second.startswith("map-"):
         raise ProblemError(422, MIXED)
-    a, b = (_found(frame, place) for place in (first, second))
+    if session is not None and not first.startswith("map-"):
+        raise ProblemError(422, OF_SCAN)
+    where = _map(server, session) if first.startswith("map-") else server.runtime.newest()
+    a, b = (found_at(where, place) for place in (first, second))
     if a.feature == b.feature:
         raise NotFoundError("Both places are on the same wall or corner: give places on two different ones.")
     walls = a.feature.kind == b.feature.kind == "wall"
-    if first.startswith("map-"):
-        found = of_map.distance(_map(frame), a.feature, b.feature)
-        turn = of_map.angle(_map(frame), a.feature, b.feature) if walls else None
+    if isinstance(where, JointWalls):
+        found = of_map.distance(where, a.feature, b.feature)
+        turn = of_map.angle(where, a.feature, b.feature) if walls else None
     else:
-        found = of_scan.distance(frame.main, a.feature, b.feature)
-        turn = of_scan.angle(frame.main, a.feature, b.feature) if walls else None
+        found = of_scan.distance(where.main, a.feature, b.feature)
+        turn = of_scan.angle(where.main, a.feature, b.feature) if walls else None
     return {
         "first": a.said,
         "second": b.said,
@@ -118,68 +92,33 @@ def measure(frame: CurrentFrame, first: Place, second: Place) -> MeasureJson:
     }
 
 
-def _found(frame: Frame, place: str) -> _Found:
-    """The corner or wall that a place means. Raises NotFoundError."""
-    _, _, id = place.partition(":")
-    return _wall(_map(frame), int(id)) if id else _nearest(frame, place)
-
-
-def _wall(walls: Walls, id: int) -> _Found:
-    """The wall with an id. Raises NotFoundError."""
-    where = np.flatnonzero(walls.ids == id)
-    if not len(where):
-        raise NotFoundError(
-            f"The map has no wall {id} now: take an id that /walls gives. Walls that become one keep the oldest id."
-        )
-    x, y = walls.ends[where[0]].mean(0).tolist()
-    return _Found(Feature("wall", id), {"kind": "map-wall", "id": id, "at": (x, y)})
-
-
-def _nearest(frame: Frame, place: str) -> _Found:
-    """The corner or wall nearest to a place. Raises NotFoundError."""
-    kind, _, xy = place.partition("@")
-    at = np.array([float(value) for value in xy.split(",")])
-    features, ids, spots = _of_map(frame, kind, at) if kind.startswith("map-") else _of_scan(frame, kind, at)
-    ways = np.hypot(*(spots - at).T)
-    if not len(ways) or ways.min() > SNAP:
-        raise NotFoundError(f"There is no {kind} within {SNAP} m of {xy}: give a place nearer to one.")
-    nearest = int(ways.argmin())
-    x, y = spots[nearest].tolist()
-    return _Found(features[nearest], {"kind": cast(Kind, kind), "id": ids[nearest], "at": (x, y)})
-
-
-def _of_scan(frame: Frame, kind: str, at: Array) -> _Candidates:
-    """Corners or walls of the scan by the main method, with their numbers and places."""
-    if kind == "corner":
-        main = next(iter(frame.features))
-        ids = {row.index[main]: row.id for row in frame.corners if main in row.index}
-        spots = act(frame.pose, frame.main.corners.xy)
-        return [Feature("corner", i) for i in range(len(spots))], [ids[i] for i in range(len(spots))], spots
-    start, end = (act(frame.pose, p) for p in (frame.main.segments.start, frame.main.segments.end))
-    numbers = list(range(len(start)))
-    return [Feature("wall", i) for i in numbers], numbers, _closest(at, start, end)
-
-
-def _of_map(frame: Frame, kind: str, at: Array) -> _Candidates:
-    walls = _map(frame)
-    if kind == "map-corner":
-        numbers = list(range(len(walls.corners)))
-        return [Feature("corner", i) for i in numbers], numbers, walls.corners.xy
-    ids = walls.ids.tolist()
-    return [Feature("wall", id) for id in ids], ids, _closest(at, walls.ends[:, 0], walls.ends[:, 1])
-
-
-def _map(frame: Frame) -> Walls:
-    """The walls that the frame shows. Raises NotFoundError."""
-    walls = frame.picture.walls if frame.picture else None
-    if not isinstance(walls, Walls):
+def _map(server: State, session: int | None) -> JointWalls:
+    """The walls of a map that is kept, or else of that which the page shows. Raises NotFoundError."""
+    kept = asked_session(server, session)
+    if kept is not None:
+        return _kept(server.landmarks, kept)
+    picture = server.runtime.newest().picture
+    if picture is None or not isinstance(picture.walls, JointWalls):
         raise NotFoundError(NO_WALLS)
-    return walls
+    return picture.walls
 
 
-def _closest(at: Array, start: Array, end: Array) -> Array:
-    """The place (M, 2) on each wall that is nearest to a point (2,)."""
-    way = end - start
-    part = np.clip(((at - start) * way).sum(1) / np.maximum((way**2).sum(1), 1e-12), 0, 1)
-    spots: Array = start + part[:, None] * way
-    return spots
+def _kept(landmarks: LandmarkStore, session: int) -> JointWalls:
+    """The walls of a map that is kept. Raises NotFoundError, which says why they cannot be measured."""
+    joint = landmarks.joint_walls(session)
+    if joint is None:
+        raise NotFoundError(_why_not(landmarks, session))
+    return joint
+
+
+def _why_not(landmarks: LandmarkStore, session: int) -> str:
+    if landmarks.writes(session):
+        return BEING_MADE.format(session)
+    count = landmarks.atlas.session(session).walls
+    if not count:
+        return BARE.format(session)
+    return (
+        TOO_MANY.format(session, MOST_WALLS)
+        if count > MOST_WALLS
+        else NOT_JOINT.format(session, COVARIANCE_FILE)
+    )

@@ -24,7 +24,7 @@ from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from ..wall_json import WallJson, wall_rows
 from .dependencies import Server
-from .grid import running_walls
+from .grid import asked_session, running_walls
 from .landmarks import USUAL, Limit, Metres, Region
 
 Mask = NDArray[np.bool_]
@@ -100,9 +100,8 @@ def _asked(
         ),
     ] = None,
 ) -> WallTable:
-    if session is None and server.runtime.settings.navigation.mode == "localize":
-        session = server.runtime.navigation.session
-    return running_walls(server.runtime) if session is None else server.landmarks.walls(session)
+    kept = asked_session(server, session)
+    return running_walls(server.runtime) if kept is None else server.landmarks.walls(kept)
 
 
 Asked = Annotated[WallTable, Depends(_asked)]
