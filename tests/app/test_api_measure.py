@@ -160,6 +160,8 @@ def finished(server: Server) -> tuple[Server, int, dict[tuple[str, str], Json]]:
     wait_until(lambda: server.get("/sessions")["store"]["session"] is not None, "the map is kept")
     session = server.get("/sessions")["store"]["session"]
     wait_until(lambda: told(session=session) == told(), "all of it is on the disk")
+    server.runtime.player.refresh()  # the scan is shown with that map
+    wait_until(lambda: server.runtime.frame.picture is server.runtime.navigation.picture, "it is measured in")
     assert "still being made: leave out session" in refused(server, 404, session=session)
     truth = all_measured(server)
     server.change("PATCH", "/settings", {"navigation": {"mode": "off"}})

@@ -31,7 +31,8 @@ BARE = "Map {} has no walls that can be measured: give the session of a map of w
 TOO_MANY = "Map {} has more than {} walls: of so many it is not kept how they err together."
 NOT_JOINT = (
     "A map that is kept can be measured if it is known how its walls err together, and of map {} it is not: its making "
-    "was not finished, an older version kept it, or it was loaded without {}. Make it once more of its recording."
+    "was not finished, an older version kept it, or it was loaded without {}, which files of more than {} walls lack. "
+    "Make it once more from its recording."
 )
 
 
@@ -120,5 +121,5 @@ def _why_not(landmarks: LandmarkStore, session: int) -> str:
     return (
         TOO_MANY.format(session, MOST_WALLS)
         if count > MOST_WALLS
-        else NOT_JOINT.format(session, COVARIANCE_FILE)
+        else NOT_JOINT.format(session, COVARIANCE_FILE, MOST_WALLS)
     )

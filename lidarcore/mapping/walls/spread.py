@@ -43,10 +43,11 @@ def joint_spread(covariance: ArrayLike) -> Spread:
 
 
 def spread_by(covariance: NDArray[np.floating], M: csr_array) -> Array:
-    """M C M^T (R, R) of a covariance (N, N) and a sparse M (R, N)."""
+    """M C M^T (R, R) of a covariance C (N, N), which is symmetric, and a sparse M (R, N)."""
     columns = np.unique(M.indices)
-    dense: Array = M[:, columns].toarray()
-    return dense @ covariance[np.ix_(columns, columns)] @ dense.T
+    few = M[:, columns]
+    spread: Array = few @ (few @ covariance[np.ix_(columns, columns)]).T
+    return spread
 
 
 def _roots(C: Array) -> Array:
