@@ -9,7 +9,7 @@ from threading import Lock
 from typing import NamedTuple
 
 from lidarcore.errors import MapFileError, UnknownSessionError
-from lidarcore.landmarks import Atlas, LandmarkMap, Session
+from lidarcore.landmarks import LandmarkMap, Session
 from lidarcore.localization import Landmarks
 from lidarcore.localization import from_stored as landmarks_from_stored
 from lidarcore.mapping.grid import OccupancyGrid
@@ -26,6 +26,7 @@ from .wall_writer import (
     grid_to_stored,
     to_stored,
 )
+from .watched_atlas import WatchedAtlas
 from .write_queue import WriteQueue
 
 PATIENCE = 2.0  # s to wait while another process writes
@@ -66,7 +67,7 @@ class LandmarkStore:
 
     def __init__(self, url: str | Path) -> None:
         """Open, or make, the file. Raises LandmarkMapError."""
-        self.atlas = Atlas(url, PATIENCE)
+        self.atlas = WatchedAtlas(url, PATIENCE)
         self.listeners: list[Callable[[MapChange], None]] = []
         self._run: SessionWriter | None = None
         self._used: int | None = None

@@ -116,14 +116,15 @@ class Hub:
         sent: Callable[[Frame], None],
     ) -> None:
         """`sent` is told of every frame that was handed to a browser's socket."""
-        self._runtime, self._recorder, self._sent = runtime, recorder, sent
+        self._runtime, self._recorder, self._landmarks, self._sent = runtime, recorder, landmarks, sent
         self._mailboxes: set[Mailbox] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._session: int | None = None  # that was written to last
         self._walls: WallTable | None = None  # of the map that the newest frame shows
         runtime.frame_listeners.append(self._shown)
         landmarks.listeners.append(self._written)
-        runtime.change_listeners.append(lambda: self._post(Mailbox.put_state))
+        for listeners in (runtime.change_listeners, landmarks.atlas.listeners):
+            listeners.append(lambda: self._post(Mailbox.put_state))
 
     @property
     def clients(self) -> int:
@@ -148,6 +149,7 @@ class Hub:
             "localization": runtime.localization(),
             "recorder": self._recorder.status,
             "ready": runtime.ready,
+            "sessions_revision": self._landmarks.atlas.revision,
         }
         return _message("state", to_json(state).decode())
 

@@ -130,6 +130,7 @@ function accept(state) {
   set("localization", state.localization);
   set("recorder", state.recorder);
   set("ready", state.ready);
+  set("sessionsRevision", state.sessions_revision);
   known();
 }
 

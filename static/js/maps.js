@@ -49,16 +49,16 @@ export function mountMaps() {
       clearButton,
     ),
   );
-  on(["panel", "localization", "mapped", "making"], refresh);
+  on(["panel", "localization", "mapped", "sessionsRevision"], refresh);
   on(["maps", "localization", "landmarks", "renamingMap"], draw);
   set("renamingMap", null);
   on(["localization", "settings", "maps"], offer);
 }
 
-let listed = ""; // when the maps were asked for: with which panel open, which map in use, how many walls in one that grows, and which was made
+let listed = ""; // when the maps were asked for: with which panel open, which map in use, how many walls in one that grows, and which list of sessions
 
-function refresh(panel, { session, mode }, { walls }, making) {
-  const wanted = [panel, session, mode, walls.length, making?.session].join(" ");
+function refresh(panel, { session, mode }, { walls }, revision) {
+  const wanted = [panel, session, mode, walls.length, revision].join(" ");
   if (panel === "map" && listed !== wanted) list();
   listed = wanted;
 }
@@ -72,9 +72,15 @@ const calledById = (id) => called(get("maps").sessions.find((session) => session
 /** As a sentence begins. */
 const begun = (words) => words[0].toUpperCase() + words.slice(1);
 
+let asked = 0;
+let answered = 0;
+
 async function list() {
+  const number = ++asked;
   const maps = await attempt(() => request("GET", "sessions"), "The maps could not be listed");
-  if (maps) set("maps", maps);
+  if (!maps || number < answered) return; // an answer that was overtaken
+  answered = number;
+  set("maps", maps);
 }
 
 const NONE = "None yet. SLAM builds one, or load a file: landmarks, or a map of ROS.";

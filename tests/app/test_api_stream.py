@@ -18,13 +18,15 @@ from lidarcore_app.jobs.wall_writer import grid_to_stored
 from lidarcore_app.pipeline.newest import NewestScan
 from lidarcore_app.web.stream import Mailbox
 from lidarcore_app.web.transport import SEND_BUFFER
-from serving import CORNERS, ROOT, Json, Server, strict_json, write_room
+from serving import CORNERS, ROOT, Json, Server, assert_problem, strict_json, write_room
 from waiting import PATIENCE
 
 from lidarcore import open_recording
 from lidarcore.mapping.grid import build_grid
 
 RECEIVE_BUFFER = 8192
+EMPTY = {"format": "lidarcore landmarks", "version": 1, "unit": "m"}
+CORNER = {"x": 1, "y": 2, "var_x": 1e-4, "cov_xy": 0, "var_y": 1e-4, "kind": "corner"}
 
 
 def test_first_comes_the_state_then_the_newest_frame(server: Server) -> None:
@@ -32,7 +34,8 @@ def test_first_comes_the_state_then_the_newest_frame(server: Server) -> None:
     with server.stream() as stream:
         state, frame = stream.message(), stream.message()
     assert state["type"] == "state"
-    assert state.keys() == {"type", "settings", "source", "selection", "localization", "recorder", "ready"}
+    told = {"settings", "source", "selection", "localization", "recorder", "ready", "sessions_revision"}
+    assert state.keys() == {"type", *told}
     assert state["settings"] == server.get("/settings")
     assert state["source"].keys() == server.get("/source").keys()
     assert state["recorder"] == server.get("/recorder")
@@ -78,6 +81,26 @@ def test_a_run_that_begins_is_told_of_though_nothing_else_changes(server: Server
         assert state["localization"]["method"] == "scans"
         server.change("PATCH", "/settings", {"navigation": {"mode": "off"}})
         stream.until("state", lambda state: state["localization"]["method"] is None)
+
+
+def test_another_list_of_sessions_is_told_of_by_another_number(server: Server) -> None:
+    atlas = server.app.state.server.landmarks.atlas
+    with server.stream() as stream:
+        known = stream.state()["sessions_revision"]
+
+        def is_told() -> bool:
+            nonlocal known
+            before, known = known, atlas.revision
+            return bool(stream.state(lambda state: state["sessions_revision"] == known)) and known > before
+
+        id = server.change("POST", "/map", EMPTY | {"landmarks": [CORNER]})["id"]
+        assert is_told()
+        server.change("PATCH", f"/sessions/{id}", {"name": "Hall"})
+        assert is_told()
+        server.http.delete(f"/sessions/{id}").raise_for_status()
+        assert is_told()
+        assert_problem(server.http.delete(f"/sessions/{id}"), 404)
+        assert atlas.revision == known
 
 
 def test_every_change_is_told_to_every_client(server: Server, room: Path) -> None:

@@ -119,6 +119,28 @@ def test_a_map_is_named_by_the_keyboard_and_nameless_again(
     server.api.delete(f"sessions/{id}").raise_for_status()
 
 
+def test_the_list_of_maps_follows_what_others_do(visitor: Visitor) -> None:
+    page, api = visitor.page, visitor.server.api
+    page.get_by_role("tab", name="Map").click()
+    rows = page.locator("#map-list li")
+    expect(page.locator("#map-list")).not_to_be_empty()
+    before = rows.count()
+    id = api.post("map", json=MAP).raise_for_status().json()["id"]
+    expect(rows).to_have_count(before + 1)
+    api.patch(f"sessions/{id}", json={"name": "Hall of others"}).raise_for_status()
+    expect(rows.first).to_contain_text("Hall of others")
+    asked = sum("/sessions" in url for url in visitor.asked)
+    page.get_by_role("tab", name="Source").click()
+    api.delete(f"sessions/{id}").raise_for_status()
+    revision = visitor.knows("sessionsRevision")
+    visitor.server.patch("settings", {"view": {"theme": "light"}})
+    visitor.catch_up()
+    assert visitor.knows("sessionsRevision") >= revision
+    assert sum("/sessions" in url for url in visitor.asked) == asked  # nobody sees the list
+    page.get_by_role("tab", name="Map").click()
+    expect(rows).to_have_count(before)
+
+
 def test_a_question_takes_the_place_of_the_one_before(visit: Callable[..., Visitor], server: Server) -> None:
     """Else who taps twice on one answer gives the next one, too."""
     page = visit(390, 844).open().page
