@@ -13,6 +13,7 @@ from ..errors import ConflictError, NotFoundError
 from ..pipeline.settings import Settings
 from .landmark_store import LandmarkStore
 from .map_making import Making, MakingStatus
+from .map_name import stem_of
 
 MOST = 8  # that wait, and that have ended and are kept
 
@@ -41,7 +42,9 @@ class MapMaker:
             finished = [one for one in self._ended if one.state == "finished" and id in (None, one.id)]
         if not finished:
             raise NotFoundError("No such map of a recording is finished: make one first.")
-        return finished[-1].files, f"map-{finished[-1].session}.zip"
+        made = finished[-1]
+        assert made.session is not None
+        return made.files, f"{stem_of(self._store.atlas, made.session)}-with-poses.zip"
 
     def start(self, path: Path, topic: str | None, scans: int | None, settings: Settings) -> MakingStatus:
         """Make a map of the recording at a path, of so many scans, with the settings of the sensor and of walls.

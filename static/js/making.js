@@ -109,6 +109,6 @@ function outcome({ id, recording, state, session, error, elapsed_s: took }) {
   if (state === "failed") return [el("p", { class: "fault", role: "alert" }, `No map of ${recording}: ${error}`)];
   if (state !== "finished") return [];
   const href = address(`${STATUS}/files?id=${id}`).href;
-  const files = el("a", { href, download: `map-${session}.zip` }, "Save all files, with the poses");
+  const files = el("a", { href, download: "" }, "Save all files, with the poses"); // the server names it after the map
   return [el("p", { class: "muted" }, `Map ${session} of ${recording}, made in ${duration(took)}. `, files)];
 }

@@ -15,6 +15,7 @@ const BUILDING = { zip: "ROS map, walls and plan", png: "Picture" };
 const FORMATS = { json: "JSON", csv: "CSV", geojson: "GeoJSON", png: "Picture", zip: "ROS map" };
 const OF_GRID = { zip: "ROS map", png: "Picture" };
 const OF_WALLS = { ...BUILDING, svg: "Plan, SVG", dxf: "Plan, DXF" };
+const BY_SERVER = ""; // what a file is saved as: the server names it after its map
 const LOADED = ["json", "csv", "geojson", "zip"];
 const MAX_NAME = 200; // characters
 const OF_ROS = ["yaml", "yml", "pgm", "png", "bmp"]; // which come together
@@ -171,7 +172,7 @@ const buildingLinks = () => [
 const saveLinks = (session, formats) => [
   el("p", { class: "muted" }, `Save ${calledById(session)} as`),
   ...Object.entries(formats).map(([format, name]) =>
-    saveLink(`map?format=${format}&session=${session}`, `map-${session}.${format}`, name, calledById(session)),
+    saveLink(`map?format=${format}&session=${session}`, BY_SERVER, name, calledById(session)),
   ),
 ];
 

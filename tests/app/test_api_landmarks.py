@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 from zipfile import ZipFile
 
 import numpy as np
@@ -290,6 +291,27 @@ def test_a_session_is_named_renamed_and_nameless_again(maps: Maps) -> None:
     unknown = assert_problem(maps.server.http.patch("/sessions/999", json={"name": "x"}), 404)
     assert "no session 999" in unknown["detail"]
     maps.server.http.delete(path).raise_for_status()
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("Hall, ground floor", "Hall-ground-floor"),
+        ('a/b\\c: "d" - e_1', "abc-d-e_1"),
+        ("Größe", "Größe"),
+        ("दीवार २", "दीवार-२"),
+        ("廊" * 200, "廊" * 50),
+        ("../..", None),
+    ],
+)
+def test_a_file_of_a_map_is_named_after_it(maps: Maps, name: str, stem: str | None) -> None:
+    id = maps.large.session
+    maps.server.change("PATCH", f"/sessions/{id}", {"name": name})
+    file = maps.server.http.get("/map", params={"session": id, "format": "csv"}).raise_for_status()
+    wanted = f"{stem or f'map-{id}'}.csv"
+    plain, encoded = f'filename="{wanted}"', f"filename*=utf-8''{quote(wanted)}"
+    assert file.headers["content-disposition"] == f"attachment; {plain if wanted.isascii() else encoded}"
+    maps.server.change("PATCH", f"/sessions/{id}", {"name": ""})
 
 
 @pytest.mark.parametrize("name", ["json", "csv", "geojson"])

@@ -139,7 +139,8 @@ def test_maps_wait_for_each_other_and_can_be_cancelled_meanwhile(server: Server)
     assert [one["id"] for one in server.get("/sessions")["sessions"]] == sessions
     for one in found["ended"]:  # also of the one that was not made last
         answer = server.http.get(f"{MAKING}/files", params={"id": one["id"]}).raise_for_status()
-        assert f"map-{one['session']}.zip" in answer.headers["content-disposition"]
+        stem = Path(one["recording"]).stem
+        assert f'filename="{stem}-with-poses.zip"' in answer.headers["content-disposition"]
         with ZipFile(io.BytesIO(answer.content)) as archive:
             assert len(archive.read("poses.csv").splitlines()) == 61
 

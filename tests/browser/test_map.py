@@ -282,6 +282,7 @@ def test_map_is_saved_loaded_localized_in_and_deleted(mapped: Visitor) -> None:
     session = server.get("localization")["session"]
     with page.expect_download() as saved:
         page.get_by_role("link", name=f"Save map {session} as JSON").click()
+    assert saved.value.suggested_filename == f"map-{session}.json"
     kept = json.loads(saved.value.path().read_text())["landmarks"]
     assert len(kept) >= FEW
     file = {"name": "room.json", "mimeType": "application/json", "buffer": saved.value.path().read_bytes()}

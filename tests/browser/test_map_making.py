@@ -27,7 +27,7 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     session = server.get("map/making")["making"]["session"]
     with page.expect_download() as saved:
         page.get_by_role("link", name="Save all files, with the poses").click()
-    assert saved.value.suggested_filename == f"map-{session}.zip"
+    assert saved.value.suggested_filename == "emulated-s1-with-poses.zip"
     with ZipFile(io.BytesIO(saved.value.path().read_bytes())) as archive:
         poses = archive.read("poses.csv").decode().splitlines()
     assert len(poses) == 1 + server.get(f"recordings/{DEMO}/facts")["scans"]

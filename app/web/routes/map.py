@@ -21,6 +21,7 @@ from lidarcore.mapping.walls import WallTable
 
 from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
+from ...jobs.map_name import stem_of
 from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
 from .dependencies import Server
@@ -82,8 +83,12 @@ async def download(
 ) -> FileResponse:
     """All landmarks of a session, in metres in its world frame. Made for one request at a time: others wait.
 
-    If it has an occupancy grid, the picture is of that. 404 if there are no walls to draw a floor plan of, or a map of
-    whole scans has no landmarks; 422 if a resolution is given for anything but a picture, or the grid is coarser.
+    The file is named after the session: hall.zip, or map-3.zip without a name. If it has an occupancy grid, the picture
+    is of that. Walls are those that three scans of the map saw; all walls of a map that was made of a recording, and
+    the poses of all its scans, are in the zip at /map/making/files.
+
+    404 if there are no walls to draw a floor plan of, or a map of whole scans has no landmarks; 422 if a resolution is
+    given for anything but a picture, or the grid is coarser.
     """
     if resolution is not None and format not in PICTURES:
         raise ProblemError(422, f"resolution is that of a picture, png or zip: leave it out for {format}.")
@@ -146,7 +151,8 @@ def _file(
     except BaseException:
         folder.cleanup()
         raise
-    name, cleanup = f"map-{landmark_map.session}.{format}", BackgroundTask(folder.cleanup)
+    name = f"{stem_of(landmarks.atlas, landmark_map.session)}.{format}"
+    cleanup = BackgroundTask(folder.cleanup)
     return FileResponse(path, media_type=MEDIA_TYPES[format], filename=name, background=cleanup)
 
 

@@ -72,9 +72,10 @@ def cancel(server: Server, id: Id = None) -> None:
     responses=ZIP | documented(404),
 )
 def files(server: Server, id: Id = None) -> FileResponse:
-    """All files of the map that was made last, or of another: what /map gives as zip, and poses.csv of all scans.
+    """A zip of all files of the map that was made last, or of another: as /map gives it, and poses.csv of all scans.
 
-    The poses have covariances.
+    The poses have covariances, and the walls are all of them, where /map gives those alone that three scans saw. The
+    file is named after the session: hall-with-poses.zip, or map-3-with-poses.zip without a name.
     """
     path, name = server.map_maker.files(id)
     return FileResponse(path, media_type="application/zip", filename=name)

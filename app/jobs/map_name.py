@@ -1,0 +1,27 @@
+"""What files of a map are named after."""
+
+import re
+import unicodedata
+from contextlib import suppress
+
+from lidarcore.errors import UnknownSessionError
+from lidarcore.landmarks import Atlas
+
+LONGEST = 50  # characters: with an ending no more than the 255 bytes that file systems take, in any script
+
+
+def stem_of(atlas: Atlas, session: int) -> str:
+    """The name of a session as that of a file, without an ending; "map-3" if it has none, or is gone."""
+    with suppress(UnknownSessionError):
+        return _plain(atlas.session(session).name) or _numbered(session)
+    return _numbered(session)
+
+
+def _numbered(session: int) -> str:
+    return f"map-{session}"
+
+
+def _plain(name: str) -> str:
+    """Letters, digits, - and _ of a name, of any script, with its blanks as -."""
+    kept = "".join(c for c in re.sub(r"\s", "-", name) if c in "-_" or unicodedata.category(c)[0] in "LMN")
+    return re.sub("-+", "-", kept)[:LONGEST].strip("-")
