@@ -15,7 +15,7 @@ from .landmark_store import LandmarkStore
 from .map_making import Making, MakingStatus
 from .map_name import stem_of
 
-MOST = 8  # that wait, and that have ended and are kept
+MOST = 8  # that wait; that are finished and kept, with their files; that have come to nothing and are told of
 
 
 class MapMaker:
@@ -49,14 +49,12 @@ class MapMaker:
     def start(self, path: Path, topic: str | None, scans: int | None, settings: Settings) -> MakingStatus:
         """Make a map of the recording at a path, of so many scans, with the settings of the sensor and of walls.
 
-        While another one is made it waits; otherwise what was made before is forgotten. Raises ConflictError if this
-        one is made or waits already, or too many wait, StorageError.
+        While another one is made it waits. Raises ConflictError if this one is made or waits already, or too many
+        wait, StorageError.
         """
         with self._lock:
             self._check(path, topic)
             making = Making.of(next(self._ids), path, topic, scans, settings)
-            if self._running is None:
-                self._forget(self._ended)
             self._waiting.append(making)
             self._go_on()
             return making.status()
@@ -66,13 +64,14 @@ class MapMaker:
         with self._lock:
             running = self._running if self._running and id in (None, self._running.id) else None
             waiting = [making for making in self._waiting if making.id == id]
-            if running:
-                running.state = "cancelled"
-            elif waiting:
-                self._waiting.remove(*waiting)
-            else:
+            if not (running or waiting):
                 raise NotFoundError("No such map of a recording is being made, or waits.")
-        self._forget(waiting)
+            for making in waiting:
+                self._waiting.remove(making)
+                making.cancel()
+                self._keep(making)
+            if running:
+                running.state = "cancelled"  # it has ended once its process has
         if running and running.process:
             running.process.kill()
 
@@ -105,8 +104,7 @@ class MapMaker:
             making.end(session, error)
             if session is not None and making.state != "finished":  # cancelled at the last moment
                 self._store.atlas.delete(session)
-            self._ended.append(making)
-            self._forget(self._ended, MOST)
+            self._keep(making)
             self._running = None
             self._go_on()
 
@@ -118,11 +116,20 @@ class MapMaker:
         except LidarError as error:
             return None, str(error)
 
+    def _keep(self, making: Making) -> None:
+        """Tell of one that has ended; no file of a map goes for one that came to nothing."""
+        self._ended.append(making)
+        is_finished = making.state == "finished"
+        alike = [one for one in self._ended if (one.state == "finished") == is_finished]
+        for earlier in alike[:-MOST]:
+            self._ended.remove(earlier)
+            earlier.forget()
+
     @staticmethod
-    def _forget(some: list[Making], but: int = 0) -> None:
-        """Remove the first ones with their files, but for so many."""
-        while len(some) > but:
-            some.pop(0).forget()
+    def _forget(some: list[Making]) -> None:
+        """Remove all of them, with their files."""
+        while some:
+            some.pop().forget()
 
 
 def _name_of(recording: str) -> str:

@@ -93,12 +93,18 @@ class Making:
         if self.state != "finished":
             self.forget()
 
+    def cancel(self) -> None:
+        """End one that waits."""
+        self.state = "cancelled"
+        self.end(None, None)
+
     def packed(self) -> Path:
-        """All files of the map in one. Raises StorageError."""
+        """All files of the map in one, which takes their place. Raises StorageError."""
         path = self.files
         with storing("The map cannot be packed"), ZipFile(path, "w", ZIP_DEFLATED) as archive:
             for file in sorted(self._output.iterdir()):
                 archive.write(file, file.name)
+                file.unlink()
         return path
 
     def forget(self) -> None:

@@ -91,7 +91,7 @@ function draw(found) {
   }
   queue.hidden = !waiting.length;
   remake(queue, waiting, () => waiting.map(waitingLine));
-  remake($("made"), ended, () => ended.flatMap(outcome));
+  remake($("made"), ended, () => [...ended.filter(isLast).flatMap(outcome), ...(ended.some(isFinished) ? [kept()] : [])]);
 }
 
 function waitingLine({ id, recording }) {
@@ -105,10 +105,17 @@ function progressText({ recording, done, total }) {
   return `Map of ${recording}: ${wholeNumber(done)}${total ? ` of ${wholeNumber(total)}` : ""} scans`;
 }
 
+/** What failed is told of until its recording was tried again. */
+const isLast = ({ state, recording }, place, ended) =>
+  state === "finished" || ended.findLastIndex((one) => one.recording === recording) === place;
+
+const kept = () => el("p", { class: "muted" }, "The server keeps the files of the last eight until it ends.");
+
 function outcome({ id, recording, state, session, error, elapsed_s: took }) {
   if (state === "failed") return [el("p", { class: "fault", role: "alert" }, `No map of ${recording}: ${error}`)];
   if (state !== "finished") return [];
   const href = address(`${STATUS}/files?id=${id}`).href;
-  const files = el("a", { href, download: "" }, "Save all files, with the poses"); // the server names it after the map
+  const words = "Save all files, with the poses";
+  const files = el("a", { href, download: "", "aria-label": `${words}, of map ${session}` }, words); // named by the server
   return [el("p", { class: "muted" }, `Map ${session} of ${recording}, made in ${duration(took)}. `, files)];
 }

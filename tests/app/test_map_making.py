@@ -10,6 +10,8 @@ from zipfile import ZipFile
 import numpy as np
 import psutil
 import pytest
+from lidarcore_app.jobs.map_making import Making
+from lidarcore_app.pipeline.settings import Settings
 from serving import Json, Server, assert_problem, wait_until
 from two_lidars import write_two_lidars
 
@@ -128,21 +130,62 @@ def test_maps_wait_for_each_other_and_can_be_cancelled_meanwhile(server: Server)
         (id, "waiting", 0.0) for id in others[:2]
     ]
 
-    wait_until(lambda: len(server.get(MAKING)["ended"]) == 3, "all are made", LONGEST)
+    wait_until(lambda: len(server.get(MAKING)["ended"]) == 9, "all are made", LONGEST)
     found = server.get(MAKING)
-    assert [(one["id"], one["recording"], one["state"]) for one in found["ended"]] == [
+    assert [(one["id"], one["recording"], one["state"], one["elapsed_s"]) for one in found["ended"][:6]] == [
+        (id, name, "cancelled", 0.0) for id, name in zip(others[2:], names[3:9], strict=True)
+    ]
+    assert [(one["id"], one["recording"], one["state"]) for one in found["ended"][6:]] == [
         (id, name, "finished") for id, name in zip((first, *others[:2]), names[:3], strict=True)
     ]
     assert found["making"] == found["ended"][-1]
     assert found["waiting"] == []
-    sessions = [one["session"] for one in found["ended"]]
+    finished = found["ended"][6:]
+    sessions = [one["session"] for one in finished]
     assert [one["id"] for one in server.get("/sessions")["sessions"]] == sessions
-    for one in found["ended"]:  # also of the one that was not made last
+    for one in finished:  # also of the one that was not made last
         answer = server.http.get(f"{MAKING}/files", params={"id": one["id"]}).raise_for_status()
         stem = Path(one["recording"]).stem
         assert f'filename="{stem}-with-poses.zip"' in answer.headers["content-disposition"]
         with ZipFile(io.BytesIO(answer.content)) as archive:
             assert len(archive.read("poses.csv").splitlines()) == 61
+
+
+def test_files_of_a_finished_map_stay_when_others_begin_fail_or_are_cancelled(server: Server) -> None:
+    names = [f"drive-{number}.mcap" for number in range(10)]
+    drive(server.folder / names[0], 30)
+    for name in names[1:]:
+        (server.folder / name).write_bytes((server.folder / names[0]).read_bytes())
+    finished = server.change("POST", MAKING, {"recording": names[0]})["id"]
+    assert ended(server)["state"] == "finished"
+    maker = server.app.state.server.map_maker
+    (made,) = maker._ended
+    assert {path.name for path in Path(made.folder.name).rglob("*") if path.is_file()} == {
+        "map.zip",
+        "settings.json",
+    }
+    others = [server.change("POST", MAKING, {"recording": name})["id"] for name in names[1:]]
+    for id in [*others[1:], others[0]]:
+        assert server.http.delete(MAKING, params={"id": id}).status_code == 204
+    assert [(one["id"], one["state"]) for one in server.get(MAKING)["ended"]] == [
+        (finished, "finished"),
+        *((id, "cancelled") for id in [*others[2:], others[0]]),  # eight of these nine
+    ]
+    assert server.http.get(f"{MAKING}/files", params={"id": finished}).status_code == 200
+
+
+def test_files_of_the_last_eight_maps_are_kept(server: Server) -> None:
+    maker = server.app.state.server.map_maker
+    for id in range(1, 10):
+        making = Making.of(id, server.folder / "hall.mcap", None, None, Settings())
+        making.state = "running"
+        making.files.write_bytes(b"PK")
+        making.end(id, None)
+        maker._keep(making)
+    assert [one["id"] for one in server.get(MAKING)["ended"]] == [*range(2, 10)]
+    assert all(one.files.is_file() for one in maker._ended)
+    gone = assert_problem(server.http.get(f"{MAKING}/files", params={"id": 1}), 404)
+    assert "No such map" in gone["detail"]
 
 
 def test_the_end_of_a_server_ends_what_is_made_and_what_waits(make_server: Callable[..., Server]) -> None:

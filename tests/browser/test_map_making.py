@@ -24,6 +24,7 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     expect(page.locator("#making-progress")).to_be_in_viewport()
     expect(page.locator("#made")).to_contain_text(f"of {DEMO}, made in", timeout=240_000)
     expect(page.locator("#making-progress")).to_be_hidden()
+    expect(page.locator("#made")).to_contain_text("keeps the files of the last eight until it ends")
     session = server.get("map/making")["making"]["session"]
     with page.expect_download() as saved:
         page.get_by_role("link", name="Save all files, with the poses").click()
@@ -194,7 +195,8 @@ def test_a_second_map_waits_for_the_first_one_and_can_be_given_up(visitor: Visit
     expect(queue).to_have_count(0)
     page.locator("#making-progress").get_by_role("button", name="Cancel").click()
     expect(page.locator("#making-progress")).to_be_hidden()
-    assert [one["state"] for one in server.get("map/making")["ended"]] == ["cancelled", "cancelled"]
+    ended = [(one["recording"], one["state"]) for one in server.get("map/making")["ended"]]
+    assert ended[-3:] == [(WINDSOR, "cancelled"), (DEMO, "cancelled"), (COPY, "cancelled")]
 
 
 def test_a_map_that_takes_too_long_is_cancelled(visitor: Visitor) -> None:

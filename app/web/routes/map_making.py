@@ -18,7 +18,10 @@ router = APIRouter(prefix="/map/making", tags=["landmarks"])
 
 
 class MakingJson(TypedDict):
-    """`making` is made, or was made last; `waiting` come next, in their order; `ended`, the last one last, are kept."""
+    """`making` is made, or was made last; `waiting` come next, in their order.
+
+    `ended`, the last one last, are the last 8 that are finished, and the last 8 that failed or were cancelled.
+    """
 
     making: MakingStatus | None
     waiting: list[MakingStatus]
@@ -44,7 +47,8 @@ def start(
 
     Loops are sought once more and all scans adjusted at once when it is finished, which no map that grows beside the
     sensor is. It becomes a session, as other maps do. One at a time, in a process of its own that gives way to others:
-    up to 8 wait meanwhile. What was made before is forgotten when one begins and none waited; the maps stay.
+    up to 8 wait meanwhile. The files of the last 8 that are finished, some MB each, stay until the server ends; the
+    maps stay longer.
     """
     path = server.library.path(wanted.recording)
     facts = server.library.facts(wanted.recording)
