@@ -2,6 +2,7 @@
 
 import threading
 from contextlib import suppress
+from functools import partial
 from itertools import count
 from pathlib import Path
 
@@ -91,11 +92,15 @@ class MapMaker:
             raise ConflictError(f"{MOST} maps wait already: wait for the end of one, or cancel one.")
 
     def _go_on(self) -> None:
-        """Begin the next one, if none is made."""
-        if self._running is None and self._waiting:
+        """Begin the next one that can be begun, if none is made."""
+        while self._running is None and self._waiting:
             making = self._waiting.pop(0)
-            making.begin(lambda code, message: self._end(making, code, message))
-            self._running = making  # not if it could not be begun
+            try:
+                making.begin(partial(self._end, making))
+                self._running = making
+            except OSError as error:
+                making.end(None, f"Its process cannot be started: {error.strerror}. Ask for it again.")
+                self._keep(making)
 
     def _end(self, making: Making, code: int, message: str) -> None:
         """Keep the map whose process has ended well, and go on."""

@@ -188,6 +188,28 @@ def test_files_of_the_last_eight_maps_are_kept(server: Server) -> None:
     assert "No such map" in gone["detail"]
 
 
+def test_one_whose_process_cannot_be_started_fails_and_the_next_begins(server: Server) -> None:
+    path = server.folder / "drive.mcap"
+    drive(path, 30)
+    (server.folder / "next.mcap").write_bytes(path.read_bytes())
+    state = server.app.state.server
+    too_long = "/scan" * 100_000  # for the arguments of a process
+    alone = state.map_maker.start(path, too_long, None, state.runtime.settings)
+    assert (alone.state, alone.session) == ("failed", None)
+    assert "cannot be started: Argument list too long" in alone.error
+    server.change("POST", MAKING, {"recording": path.name})
+    waiting = state.map_maker.start(path, too_long, None, state.runtime.settings)
+    assert waiting.state == "waiting"
+    server.change("POST", MAKING, {"recording": "next.mcap"})
+    wait_until(lambda: len(server.get(MAKING)["ended"]) == 4, "all have ended", LONGEST)
+    assert [(one["recording"], one["state"]) for one in server.get(MAKING)["ended"]] == [
+        (path.name, "failed"),
+        (path.name, "finished"),
+        (path.name, "failed"),
+        ("next.mcap", "finished"),
+    ]
+
+
 def test_the_end_of_a_server_ends_what_is_made_and_what_waits(make_server: Callable[..., Server]) -> None:
     server = make_server()
     for name in ("one.mcap", "two.mcap", "three.mcap"):
