@@ -108,8 +108,14 @@ def test_while_the_kernels_compile_the_server_answers_and_says_so(
         assert stream.state()["ready"] is False
         assert server.get("/health")["ready"] is False
         assert_problem(server.http.get("/pose"), 404)  # nothing is localized
+        maps = ("/walls", "/walls/nearest?x=0&y=0", "/map/grid", "/map/grid?format=zip")
+        for path in maps:
+            assert "no map of whole scans" in assert_problem(server.http.get(path), 404)["detail"]
         server.change("PATCH", "/settings", {"navigation": {"mode": "slam", "method": "scans"}})
-        for path in ("/frame", "/segments", "/corners", "/clusters", "/pose"):
+        for path in ("/frame", "/segments", "/corners", "/clusters", "/pose", *maps):
+            assert_not_yet(server.http.get(path))
+        server.change("PATCH", "/settings", {"navigation": {"mode": "localize"}})
+        for path in maps:
             assert_not_yet(server.http.get(path))
         places = {"first": "corner@1,1", "second": "corner@2,2"}
         assert_not_yet(server.http.get("/measure", params=places))

@@ -25,7 +25,7 @@ LANDMARKS = {"navigation": {"mode": "slam", "method": "landmarks"}}
 def free_area(server: Server) -> float:
     """m² that the grid says are free; 0 if there is none yet."""
     answer = server.http.get("/map/grid")
-    if answer.status_code == 404:
+    if answer.status_code in (404, 503):
         return 0.0
     shades = np.asarray(Image.open(io.BytesIO(answer.content)))
     return float((shades == 254).sum()) * float(answer.headers["Grid-Resolution"]) ** 2

@@ -105,7 +105,7 @@ class Load:
 
     async def _questions(self) -> None:
         while True:
-            await self._ask("GET", self._rng.choice(READ), 200, 404)
+            await self._ask("GET", self._rng.choice(READ), 200, 404, 503)
             await asyncio.sleep(0.5)
 
     async def _command(self, line: str) -> None:

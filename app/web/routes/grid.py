@@ -17,27 +17,32 @@ from lidarcore.mapping.export import write_map
 from lidarcore.mapping.grid import OccupancyGrid, shades_of
 from lidarcore.mapping.walls import WallTable
 
-from ...errors import NotFoundError
+from ...errors import NotFoundError, NotYetError
 from ...pipeline.runtime import Runtime
 from ..openapi import MEDIA_TYPES
 from ..problems import documented
 from ..state import State
 from .dependencies import Server
 
-router = APIRouter(tags=["localization"], responses=documented(404, 422))
+router = APIRouter(tags=["localization"], responses=documented(404, 422, 503))
 
 NO_BUILDING = 'There is no map of whole scans: set navigation.mode to slam and navigation.method to "scans".'
 NOT_YET = "The map of whole scans has no {} yet: wait for further scans."
+NOT_BEGUN = "No scan has been localized yet, which tells what map there is. Ask again in a while."
 NO_WALLS = "The map that the sensor is localized in has no walls: its grid alone is at /map/grid?format=png."
 
 
 def running_picture(runtime: Runtime) -> MapPicture:
-    """Grid and walls of the map that is made, or localized in, now. Raises NotFoundError."""
-    wanted, found = runtime.settings.navigation, runtime.navigation.picture
-    if found is not None:
+    """Grid and walls of the map that is made, or localized in, now. Raises NotYetError, NotFoundError."""
+    wanted, navigation = runtime.settings.navigation, runtime.navigation
+    if (found := navigation.picture) is not None:
         return found
     makes_one = wanted.mode == "slam" and wanted.method == "scans"
-    raise NotFoundError(NOT_YET.format("grid") if makes_one else NO_BUILDING)
+    begins = wanted.mode == "localize" and navigation.method is None and navigation.problem is None
+    if not (makes_one or begins):
+        raise NotFoundError(NO_BUILDING)
+    runtime.newest()  # says why, if no scan was processed at all
+    raise NotYetError(NOT_YET.format("grid") if makes_one else NOT_BEGUN)
 
 
 def asked_session(server: State, session: int | None) -> int | None:
@@ -48,12 +53,13 @@ def asked_session(server: State, session: int | None) -> int | None:
 
 
 def running_walls(runtime: Runtime) -> WallTable:
-    """The walls of the map that is made, or localized in, now. Raises NotFoundError."""
+    """The walls of the map that is made, or localized in, now. Raises NotYetError, NotFoundError."""
     found = running_picture(runtime).walls
-    if found is None:
-        is_made = runtime.settings.navigation.mode == "slam"
-        raise NotFoundError(NOT_YET.format("walls") if is_made else NO_WALLS)
-    return found
+    if found is not None:
+        return found
+    if runtime.settings.navigation.mode == "slam":
+        raise NotYetError(NOT_YET.format("walls"))
+    raise NotFoundError(NO_WALLS)
 
 
 @router.get(
@@ -73,7 +79,7 @@ async def grid(
     pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
     zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF, the
     picture with its walls; poses are at /trajectory.
-    404 if there is no such map, or it has no walls.
+    404 if there is no such map, or it has no walls; 503 if it has none yet: until the first scan was mapped.
     """
     found = running_picture(server.runtime).grid
     make = (

@@ -29,7 +29,7 @@ from .landmarks import USUAL, Limit, Metres, Region
 
 Mask = NDArray[np.bool_]
 
-router = APIRouter(tags=["localization"], responses=documented(404, 422))
+router = APIRouter(tags=["localization"], responses=documented(404, 422, 503))
 
 NO_SESSION = "No map is kept yet: wait for further scans, or give the session of one that is kept."
 
@@ -124,7 +124,7 @@ def walls(
 ) -> Response:
     """The walls of the map that SLAM makes of whole scans, or that the sensor is localized in; all or those asked for.
 
-    404 if there is no such map.
+    404 if there is no such map; 503 until the first scan was mapped.
 
     A wall is in a box or circle if any part of it is. With a session those are kept that three scans of the map saw.
     """
@@ -157,7 +157,6 @@ def nearest_walls(
     "/walls/{id}/history",
     response_model=WallHistoryJson,
     response_description="The wall",
-    responses=documented(503),
 )
 def history(
     server: Server,
