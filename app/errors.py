@@ -50,6 +50,7 @@ class InvalidValues(Protocol):
 _PLACES = ("body", "query", "path")  # of a request: what the value is called says enough
 _NO_BODY = ("missing", "dict_type", "model_attributes_type")
 NO_BODY = "Send a JSON body, with the header Content-Type: application/json."
+_NO_OBJECT = 'The body is JSON, but no object: send one, {"name": value}, with the names that /docs tells.'
 
 
 def invalid_values(error: InvalidValues) -> list[tuple[list[str], str]]:
@@ -70,7 +71,7 @@ def _wrong(error: Any) -> str:
     if _is_no_json(error):
         return f"The body is not valid JSON: {error['ctx']['error']} (character {error['loc'][1] + 1})."
     if error["loc"] == ("body",) and error["type"] in _NO_BODY:
-        return NO_BODY
+        return NO_BODY if error["input"] is None or isinstance(error["input"], bytes) else _NO_OBJECT
     return str(error["msg"]).removeprefix("Value error, ")
 
 

@@ -282,11 +282,12 @@ def test_a_session_is_named_renamed_and_nameless_again(maps: Maps) -> None:
         ("x" * 201, "at most 200"),
         ("two\nlines", "cannot be shown"),
         (7, "string"),
-        (None, ""),
+        (None, 'give "" to take the name away'),
     ):
         problem = assert_problem(maps.server.http.patch(path, json={"name": wrong}), 422)
         assert words in problem["detail"]
     assert_problem(maps.server.http.patch(path, json={}), 422)
+    assert "no object: send one" in assert_problem(maps.server.http.patch(path, json=[]), 422)["detail"]
     assert maps.server.get("/sessions")["sessions"][-1]["name"] == "kept"
     unknown = assert_problem(maps.server.http.patch("/sessions/999", json={"name": "x"}), 404)
     assert "no session 999" in unknown["detail"]

@@ -131,6 +131,12 @@ def test_where_no_json_is_sent_the_answer_asks_for_some(shared_server: Server) -
         assert problem["detail"].startswith("Send a JSON body")
 
 
+def test_json_that_is_no_object_is_told_so(shared_server: Server) -> None:
+    for body in ([], 3, "gap", True):
+        problem = assert_problem(shared_server.http.patch("/settings", json=body), 422)
+        assert problem["detail"].startswith("The body is JSON, but no object")
+
+
 def test_the_schema_describes_every_number_with_range_and_meaning(server: Server) -> None:
     schema = server.get("/settings/schema")
 

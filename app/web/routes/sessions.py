@@ -3,7 +3,7 @@
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Path
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
@@ -23,11 +23,18 @@ class SessionsJson(TypedDict):
     sessions: list[Session]
 
 
+def _given(name: object) -> object:
+    if name is None:
+        raise ValueError('null is no name: give "" to take the name away.')
+    return name
+
+
 class SessionChange(StrictBody):
     """What to change of a session."""
 
     name: Annotated[
         str,
+        BeforeValidator(_given),
         Field(
             description="what people call it, of printable characters, without blanks around; empty takes it away",
             json_schema_extra={"maxLength": MAX_NAME},
