@@ -15,7 +15,18 @@ if TYPE_CHECKING:
 
     from ..pipeline.settings import Settings
 
-RecordingPath = Annotated[Path, typer.Argument(help="a recording of any known format; its content decides")]
+
+def named_recording(name: str) -> Path:
+    """Raises BadParameter if the name is empty, as of a variable that is not set: it would mean the working folder."""
+    if not name.strip():
+        raise typer.BadParameter("the name of the recording is empty: give its path.")
+    return Path(name)
+
+
+RecordingPath = Annotated[
+    Path,
+    typer.Argument(parser=named_recording, help="a recording of any known format; its content decides"),
+]
 Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
 TopicOfAll = Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")]
 MOST = 1_000_000_000  # of whatever is counted: more than any recording holds

@@ -101,8 +101,12 @@ def _map_of(path: Path, head: bytes) -> str:
 def _head(path: Path) -> bytes:
     if path.is_dir():
         return b""
-    if not path.is_file():
+    if not path.exists():
         raise RecordingError(f"There is no file {path}: give the path of a recording.")
+    if not path.is_file():
+        raise RecordingError(
+            f"There is no file at {path} but a device or a pipe: save the recording, and give its path."
+        )
     head = read_head(path)
     if not head:
         raise RecordingError(f"{path.name} is empty.")

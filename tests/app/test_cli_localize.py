@@ -123,6 +123,16 @@ def test_a_map_of_ranges_in_millimetres_says_to_check_the_unit(tmp_path: Path) -
 def test_poses_are_written_as_csv_only(tmp_path: Path) -> None:
     refused = run("localize", "no-recording.npz", "-o", tmp_path / "poses.txt")
     assert_refused(refused, "poses.txt should end in .csv")
+    for nameless in ("", ".csv"):
+        refused = run("localize", "no-recording.npz", "-o", nameless)
+        assert_refused(refused, "The file to write has no name: give one, such as results.csv.")
+
+
+@pytest.mark.parametrize("command", ["info", "localize"])
+def test_a_recording_without_a_name_is_not_the_working_folder(command: str) -> None:
+    refused = run(command, "")
+    assert refused.returncode == 2
+    assert "the name of the recording is empty" in refused.stderr
 
 
 def test_a_map_goes_into_a_folder_with_a_name(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import pytest
 from lidarcore_app.cli.main import cli
 from typer.testing import CliRunner
 
+from lidarcore.errors import EvaluationError
 from lidarcore.geometry import relative
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
@@ -101,6 +102,22 @@ def test_raw_odometry_is_no_reference(drive: Path, tmp_path: Path) -> None:
     assert re.search("reference +none.* no reference poses", told)
     assert "wrong" not in told
     assert "relative poses" not in told
+
+
+def test_runs_that_would_be_one_and_the_same_are_refused(drive: Path, tmp_path: Path) -> None:
+    with np.load(drive) as file:
+        arrays = {name: file[name] for name in file}
+    del arrays["odometry"]
+    without = tmp_path / "without.npz"
+    np.savez(without, **arrays)
+    for recording, odometry in (("none.npz", "recorded"), ("none.npz", "none"), (without, "auto")):
+        asked = ["evaluate", "map", str(recording), "--odometry", odometry, "--seeds", "2"]
+        result = CliRunner().invoke(cli, asked)
+        assert result.exit_code == 2
+        assert "Leave it out" in " ".join(result.output.split())
+    asked = ["evaluate", "map", str(without), "--odometry", "recorded"]
+    with pytest.raises(EvaluationError, match="has no odometry: choose auto, none, or poor"):
+        CliRunner().invoke(cli, asked, catch_exceptions=False)
 
 
 @pytest.mark.parametrize("own", ["0.02", "nan,nan", "-1,-1", "0.02,inf", "a,b"])

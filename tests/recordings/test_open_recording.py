@@ -116,7 +116,7 @@ def test_packed_files_read_as_the_unpacked(tmp_path, name):
         (lambda folder: folder / "zero\0byte", "There is no file"),
         (lambda folder: folder / ("long" * 200), "cannot be opened"),
         (lambda folder: folder, "is not a ROS 2 bag"),
-        (lambda folder: Path("/dev/zero"), "There is no file"),
+        (lambda folder: Path("/dev/zero"), "There is no file at .* but a device or a pipe: save"),
         (lambda folder: written(folder / "empty.bag", b""), "is empty"),
         (lambda folder: written(folder / "unpacks_to_nothing.gz", gzip.compress(b"")), "is empty"),
         (
@@ -133,7 +133,7 @@ def test_packed_files_read_as_the_unpacked(tmp_path, name):
             lambda folder: packed(ros_map(folder / "hall.yaml").with_suffix(".pgm")),
             "hall.pgm.gz looks like a map.* unpack it, and load the .yaml that belongs to it",
         ),
-        (lambda folder: fifo(folder / "pipe"), "There is no file"),
+        (lambda folder: fifo(folder / "pipe"), "There is no file at .* but a device or a pipe: save"),
     ],
 )
 def test_what_is_no_recording_gets_a_clear_error(tmp_path, make, text):

@@ -48,14 +48,16 @@ def evaluate_map(
     """How far a map of a recording is from reference poses: relative poses, covariances, loops, time."""
     from lidarcore import open_recording
     from lidarcore.evaluation.maps.accuracy import name_of_reference, read_relations
-    from lidarcore.evaluation.maps.study import prepared, study
+    from lidarcore.evaluation.maps.study import is_drawn, prepared, study
 
     from ..map_run import mapper_settings
 
+    _check_seeds(seeds, odometry not in ("recorded", "none"))
     chosen = settings_from(settings, set_)
     sigmas = _sigmas(own)
     verified = None if relations is None else read_relations(relations)
     scans = list(open_recording(recording, topic, chosen.sensor.mask))
+    _check_seeds(seeds, odometry == "poor" or is_drawn(scans, odometry))
     typer.echo(f"{'reference':26} {name_of_reference(scans)}")
     for number in range(seed, seed + seeds):
         given, reference = prepared(scans, odometry, number)
@@ -65,6 +67,15 @@ def evaluate_map(
             typer.echo(f"seed {number}")
         for name, value in lines(judged):
             typer.echo(f"{name:26} {value}")
+
+
+def _check_seeds(seeds: int, are_drawn: bool) -> None:
+    """Raises BadParameter if several runs are asked for that have no errors to be drawn."""
+    if seeds > 1 and not are_drawn:
+        raise typer.BadParameter(
+            "--seeds is for poor odometry, whose errors are drawn: without it all runs would be one and the same. "
+            "Leave it out, or choose --odometry poor."
+        )
 
 
 def lines(judged: "MapStudy") -> "Iterator[tuple[str, str]]":

@@ -19,6 +19,8 @@ STUDY_FORMATS = (*FORMATS, ".html")
 
 def check(path: Path, formats: Sequence[str] = FORMATS) -> None:
     """Raises EvaluationError unless the file's name ends in one of the formats."""
+    if path.name.lower() in ("", *formats):
+        raise EvaluationError(f"The file to write has no name: give one, such as results{formats[0]}.")
     if path.suffix.lower() not in formats:
         raise EvaluationError(f"{path.name} should end in {' or '.join(formats)}: that decides the format.")
 

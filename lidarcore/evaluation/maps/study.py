@@ -75,7 +75,7 @@ def prepared(scans: list[Scan], odometry: str, seed: int) -> tuple[list[Scan], A
 
     recorded takes the log's own, poor makes that of a poor robot from the reference, none leaves it out; auto is
     recorded where the log has a reference besides, else poor.
-    Raises EvaluationError if the log's odometry is all the reference there is.
+    Raises EvaluationError if the log's odometry is all the reference there is, or it has none that is asked for.
     """
     if odometry not in ODOMETRY:
         raise EvaluationError(f"There is no odometry {odometry!r}: choose one of {', '.join(ODOMETRY)}.")
@@ -91,9 +91,20 @@ def prepared(scans: list[Scan], odometry: str, seed: int) -> tuple[list[Scan], A
         raise EvaluationError(
             "The log's odometry is all the reference there is: choose poor odometry, or none."
         )
-    if reference is not None and (odometry == "poor" or (odometry == "auto" and stands_in)):
+    if odometry == "recorded" and all(scan.odometry is None for scan in scans):
+        raise EvaluationError("The recording has no odometry: choose auto, none, or poor.")
+    if reference is not None and is_drawn(scans, odometry):
         return with_poor_odometry(scans, reference, seed), reference
     return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), reference
+
+
+def is_drawn(scans: list[Scan], odometry: str) -> bool:
+    """Whether `prepared` gives odometry with errors that are drawn: only then another seed is another run."""
+    try:
+        _, stands_in = reference_poses(scans)
+    except EvaluationError:
+        return False
+    return odometry == "poor" or (odometry == "auto" and stands_in)
 
 
 def study(
