@@ -22,6 +22,7 @@ import {
 } from "./actions.js";
 import { get } from "./store.js";
 import { toggleTheme } from "./theme.js";
+import { closeNewest } from "./toasts.js";
 
 const LAYERS = {
   p: "points",
@@ -66,7 +67,7 @@ const SHORTCUTS = [
     about: "Previous, next corner; landmark or wall of the map while that is open",
     run: (key) => nextThing()(key === "ArrowUp" ? -1 : 1),
   },
-  { keys: ["Escape"], about: "Clear the selection, or stop measuring or setting the pose", run: () => cancelPlacing() || cancelMeasure() || selectNothing() },
+  { keys: ["Escape"], about: "Stop setting the pose or measuring, close the newest message, or clear the selection", run: giveUp },
   { keys: ["m"], about: "Off, SLAM, localize", run: nextMode },
   { keys: ["i"], about: "Set the pose by dragging", run: togglePlacing },
   { keys: ["d"], about: "Measure a distance", run: toggleMeasure },
@@ -128,6 +129,11 @@ function compareWith(digit) {
   const name = fitterOf(digit);
   if (name) toggleMethod(name);
   return Boolean(name);
+}
+
+/** The first of these that there is. */
+function giveUp() {
+  return cancelPlacing() || cancelMeasure() || closeNewest() || selectNothing();
 }
 
 function nextThing() {

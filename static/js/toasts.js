@@ -13,19 +13,25 @@ new MutationObserver(() => {
   $("toasts").dataset.more = more > 0 ? `and ${more} more` : "";
 }).observe($("toasts"), { childList: true });
 
+let before = null; // what had the focus before a message had it
+
+$("toasts").addEventListener("focusin", ({ relatedTarget: last }) => {
+  if (!$("toasts").contains(last)) before = last;
+});
+
 /** Shows a message; `action` is an optional {label, run}, `about` what `clearToasts` clears it by. */
 export function toast(text, { title = "", kind = "info", action = null, about = "", linger = LINGER_MS } = {}) {
   const region = $("toasts");
   const same = [...region.children].find((node) => node.dataset.text === title + text);
-  same?.remove();
+  if (same) close(same);
   const node = el("div", { class: `toast ${kind}`, "data-about": about });
   node.dataset.text = title + text;
   const words = el("div", {}, ...(title ? [el("strong", {}, title)] : []), el("p", {}, text));
   node.append(words);
   if (action) node.append(actionButton(node, action));
-  node.append(iconButton("close", "Dismiss this message", () => node.remove()));
+  node.append(iconButton("close", "Dismiss this message", () => close(node)));
   region.append(node);
-  while (region.children.length > MOST) region.firstElementChild.remove();
+  while (region.children.length > MOST) close(region.firstElementChild);
   removeLater(node, linger);
 }
 
@@ -37,7 +43,22 @@ export function ask(text, { title, action }) {
 
 /** Removes the messages about something that is settled: the "source", or the "connection". */
 export function clearToasts(about) {
-  for (const node of $("toasts").querySelectorAll(`[data-about="${about}"]`)) node.remove();
+  for (const node of $("toasts").querySelectorAll(`[data-about="${about}"]`)) close(node);
+}
+
+/** Closes the newest message, and says whether there was one; not while a question waits for its answer. */
+export function closeNewest() {
+  const newest = $("toasts").lastElementChild;
+  if (!newest || $("toasts").querySelector('[data-about="question"]')) return false;
+  close(newest);
+  return true;
+}
+
+/** The focus, if the message has it, goes back to where it was, or to the view where that has gone. */
+function close(node) {
+  const isHeld = node.contains(document.activeElement);
+  node.remove();
+  if (isHeld) (before?.checkVisibility() ? before : $("stage"))?.focus({ preventScroll: true });
 }
 
 function removeLater(node, wait) {
@@ -58,7 +79,7 @@ export function report(error, title = "Something went wrong", about = "") {
 
 function actionButton(node, { label, run }) {
   const onclick = () => {
-    node.remove();
+    close(node);
     run();
   };
   return el("button", { type: "button", class: "button", onclick }, label);

@@ -111,3 +111,50 @@ def test_typing_a_number_is_no_shortcut(keys: Visitor) -> None:
     keys.page.keyboard.press("Enter")
     wait_until(lambda: extraction(keys.server)["min_points"] == 12, "the number is set")
     assert extraction(keys.server)["fitter"] == "ml"
+
+
+def tell(visitor: Visitor, *texts: str, how: str = "toast") -> None:
+    """Messages as modules of the page show them; a question, if `how` is "ask"."""
+    script = """([how, texts]) => import("/static/js/toasts.js").then((toasts) =>
+        texts.forEach((text) => toasts[how](text, { title: "Told", action: { label: "Go", run: () => {} } })))"""
+    visitor.page.evaluate(script, [how, list(texts)])
+
+
+def test_the_focus_returns_to_where_it_was_before_a_message_had_it(visitor: Visitor) -> None:
+    page = visitor.page
+    back = page.get_by_role("button", name="One scan back")
+    for answer, key in (("Dismiss this message", "Enter"), ("Go", "Enter"), ("Dismiss this message", "Escape")):
+        back.focus()
+        tell(visitor, "first", "second")
+        page.locator(".toast").last.get_by_role("button", name=answer).focus()
+        page.keyboard.press(key)
+        expect(page.locator(".toast p")).to_have_text(["first"])
+        expect(back).to_be_focused()
+        page.keyboard.press("Escape")
+        expect(page.locator(".toast")).to_have_count(0)
+        expect(back).to_be_focused()
+    tell(visitor, "alone")
+    page.get_by_role("button", name="Go", exact=True).focus()
+    back.evaluate("button => button.remove()")
+    page.keyboard.press("Enter")
+    expect(page.locator("#stage")).to_be_focused()
+
+
+def test_escape_closes_the_newest_message_unless_a_question_waits(visitor: Visitor) -> None:
+    page, server = visitor.page, visitor.server
+    visitor.await_frame(server.pause())
+    page.keyboard.press("ArrowDown")
+    wait_until(lambda: visitor.knows("selection")["corner"], "a corner is selected")
+    tell(visitor, "first", "second")
+    page.keyboard.press("Escape")
+    expect(page.locator(".toast p")).to_have_text(["first"])
+    tell(visitor, "Delete it?", how="ask")
+    assert server.get("selection")["corner"]
+    page.keyboard.press("Escape")
+    wait_until(lambda: server.get("selection")["corner"] is None, "nothing is selected")
+    expect(page.locator(".toast p")).to_have_text(["first", "Delete it?"])
+    page.locator(".toast").last.get_by_role("button", name="Dismiss this message").click()
+    page.keyboard.press("?")
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog", name="Keyboard shortcuts")).to_be_hidden()
+    expect(page.locator(".toast p")).to_have_text(["first"])
