@@ -24,8 +24,12 @@ BUILTIN = (_DEMO / "emulated-s1.mcap", _DEMO / "real-rplidar-windsor.npz")
 UPLOADING = ".upload-"  # begins the names of folders in which uploads arrive
 ABANDONED = 3600.0  # s without a change after which such a folder belongs to a server that was killed
 BAG_FILES = (".db3", ".mcap")  # what makes a folder a ROS 2 bag
-# A file name on every system.
+# A file name on every system, and what to do about another one.
 PLAIN_NAME = re.compile(r"(?!\.)[^/\\:*?\"<>|\x00-\x1f\x7f\ud800-\udfff]{1,200}(?<![. ])")
+PLAINLY = (
+    'leave out / \\ : * ? " < > | and control characters, a dot in front and a dot or blank at the end; '
+    "200 bytes at most"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +66,13 @@ class Library:
                 if _is_candidate(path):
                     entries.append(self._entry(path))
         return entries
+
+    def unlisted(self) -> tuple[str, ...]:
+        """Names of what could be played but for its name, as they can be shown; what is hidden is meant to be."""
+        paths = sorted(self.folder.iterdir()) if self.folder.is_dir() else []
+        return tuple(
+            path.name.encode(errors="backslashreplace").decode() for path in paths if _is_misnamed(path)
+        )
 
     def path(self, name: str) -> Path:
         """Where the recording is. Raises NotFoundError if there is none, InvalidNameError if that is no file name."""
@@ -192,15 +203,25 @@ class Library:
 
 def checked_name(name: str) -> str:
     """The name, if it is a plain file name. Raises InvalidNameError otherwise."""
-    if not PLAIN_NAME.fullmatch(name) or len(name.encode()) > 200:
-        raise InvalidNameError(
-            f"{name!r} is not a plain file name: use no slashes, no leading dot and at most 200 bytes."
-        )
+    if not _is_plain(name):
+        raise InvalidNameError(f"{name!r} is not a plain file name: {PLAINLY}.")
     return name
+
+
+def _is_plain(name: str) -> bool:
+    return bool(PLAIN_NAME.fullmatch(name)) and len(name.encode()) <= 200
 
 
 def _is_candidate(path: Path) -> bool:
     """True for files and bags whose names can be asked for. Raises OSError if it cannot be looked at."""
-    if not PLAIN_NAME.fullmatch(path.name):
-        return False
+    return _is_plain(path.name) and _is_file_or_bag(path)
+
+
+def _is_misnamed(path: Path) -> bool:
+    with suppress(OSError):
+        return not (path.name.startswith(".") or _is_plain(path.name)) and _is_file_or_bag(path)
+    return False
+
+
+def _is_file_or_bag(path: Path) -> bool:
     return path.is_file() or any(file.suffix in BAG_FILES for file in path.glob("*"))

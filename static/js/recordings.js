@@ -53,13 +53,22 @@ const isGrowing = ({ name }) => {
   return recorder?.state === "recording" && stem(recorder.name) === stem(name);
 };
 
-function drawLibrary({ folder, recordings }, source, recorder, known, renaming) {
+function drawLibrary({ folder, recordings, unlisted }, source, recorder, known, renaming) {
   const playing = source.recording;
   const growing = recorder.state === "recording" ? recorder.name : null;
-  remake($("library-list"), [folder, recordings, playing, growing, known, renaming], () => [
+  remake($("library-list"), [folder, recordings, unlisted, playing, growing, known, renaming], () => [
     el("ul", { class: "entries" }, ...recordings.map((recording) => row(recording, playing, renaming))),
+    ...(unlisted.length ? [el("p", { class: "fault" }, unlistedText(unlisted))] : []),
     el("p", { class: "muted" }, `Files in ${folder}`),
   ]);
+}
+
+const NAMED = 3; // of the files that are not listed
+
+function unlistedText(names) {
+  const more = names.length > NAMED ? ` and ${names.length - NAMED} more` : "";
+  const characters = 'Rename without \\ : * ? " < > | and control characters, a dot or blank at the end, and more than 200 bytes.';
+  return `Not listed, since such names do not work on every system: ${names.slice(0, NAMED).join(", ")}${more}. ${characters}`;
 }
 
 function row(recording, playing, renaming) {

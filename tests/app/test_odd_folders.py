@@ -27,6 +27,26 @@ def test_odd_entries_do_not_hide_the_recordings(server: Server, room: Path) -> N
     assert {entry["name"] for entry in server.get("/recordings")["recordings"]} >= {room.name, "bag"}
 
 
+def test_recordings_that_are_not_listed_for_their_names_are_named(server: Server, room: Path) -> None:
+    make_odd_entries(server.folder, ".mcap")
+    content = room.read_bytes()
+    for name in ("a<b.npz", "blank ", "ü" * 101, ".hidden.npz"):
+        (server.folder / name).write_bytes(content)
+    bag = server.folder / "bag?"
+    bag.mkdir()
+    (bag / "inside.mcap").write_bytes(content)
+    (server.folder / "folder?").mkdir()
+    found = server.get("/recordings")
+    unlisted = ["a<b.npz", "bag?", "blank ", "line\nbreak.mcap", "latin-\\udce9.mcap", "ü" * 101]
+    assert sorted(found["unlisted"]) == sorted(unlisted)
+    listed = {one["name"] for one in found["recordings"]}
+    assert room.name in listed
+    assert not listed & {*unlisted, ".hidden.npz", "folder?"}
+    for name in ("a<b.npz", "ü" * 101):
+        asked = server.http.put(f"/recordings/{name}", content=content)
+        assert 'leave out / \\ : * ? " < > |' in assert_problem(asked, 422)["detail"]
+
+
 def test_odd_entries_do_not_hide_the_profiles(server: Server) -> None:
     server.change(
         "PUT", "/profiles/mine", {"extraction": {"noise": {"sigma_range": 0.01, "sigma_bearing": 0.001}}}

@@ -123,7 +123,11 @@ def tell(visitor: Visitor, *texts: str, how: str = "toast") -> None:
 def test_the_focus_returns_to_where_it_was_before_a_message_had_it(visitor: Visitor) -> None:
     page = visitor.page
     back = page.get_by_role("button", name="One scan back")
-    for answer, key in (("Dismiss this message", "Enter"), ("Go", "Enter"), ("Dismiss this message", "Escape")):
+    for answer, key in (
+        ("Dismiss this message", "Enter"),
+        ("Go", "Enter"),
+        ("Dismiss this message", "Escape"),
+    ):
         back.focus()
         tell(visitor, "first", "second")
         page.locator(".toast").last.get_by_role("button", name=answer).focus()

@@ -1,11 +1,12 @@
 """Recordings from the page: upload, play, step and seek; what cannot be read is refused with a reason."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from browsing import GOLF, HOKUYO, Visitor, drawn
+from browsing import GOLF, HOKUYO, Server, Visitor, drawn
 from playwright.sync_api import expect
 from rosbags.rosbag1 import Writer
 from rosbags.typesys import Stores, get_typestore
@@ -192,3 +193,21 @@ def write_two_lidars(path: Path) -> Path:
                 message = scan(head, *angles, 0.0, 0.1, 0.1, 20.0, ranges, ranges[:0])
                 bag.write(connection, (100 + turn) * 10**9, store.serialize_ros1(message, scan.__msgtype__))
     return path
+
+
+def test_files_that_are_not_listed_for_their_names_are_told_of(
+    visit: Callable[..., Visitor], server: Server
+) -> None:
+    names = [f"a<{number}.npz" for number in range(5)]
+    for name in names:
+        (server.folder / name).write_bytes(b"any")
+    page = visit(390, 844).open().page
+    page.get_by_role("tab", name="Source").click()
+    told = page.locator("#library-list .fault")
+    expect(told).to_contain_text("a<0.npz, a<1.npz, a<2.npz and 2 more. Rename without")
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    for name in names:
+        (server.folder / name).unlink()
+    page.get_by_role("tab", name="Map").click()
+    page.get_by_role("tab", name="Source").click()
+    expect(told).to_have_count(0)

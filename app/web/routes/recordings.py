@@ -28,9 +28,12 @@ class NewName(StrictBody):
 
 
 class RecordingsJson(TypedDict):
+    """`unlisted` names files that are left out for their names, which do not work on every system: rename them."""
+
     folder: str
     max_bytes: int
     recordings: list[RecordingEntry]
+    unlisted: list[str]
     undo_within: float
 
 
@@ -41,6 +44,7 @@ def read(server: Server) -> RecordingsJson:
         "folder": str(server.library.folder),
         "max_bytes": server.library.max_bytes,
         "recordings": server.library.list(),
+        "unlisted": list(server.library.unlisted()),
         "undo_within": server.library.trash.undo_within,
     }
 
