@@ -70,8 +70,9 @@ function makeHead(methods, known) {
   const titles = new Map(known.map(({ name, title }) => [name, title]));
   const groups = methods.map((name) => {
     const title = titles.get(name) ?? name;
-    return el("th", { scope: "colgroup", colSpan: each, class: "group", title }, swatch(name), name);
+    return el("th", { scope: "colgroup", colSpan: each, class: "group", title }, swatch(name), ...breakable(name));
   });
+  setText($("corner-units"), `Sensor frame: x, y in m;${each > 1 ? " σ in mm;" : ""} area of the 1σ ellipse in mm²`);
   const heads = columnsFor(methods).map(({ quantity: { key, label, unit } }) =>
     el("th", { scope: "col", class: key }, label, el("span", { class: "unit" }, ` ${unit}`)),
   );
@@ -84,6 +85,9 @@ function makeHead(methods, known) {
     el("tr", {}, ...heads),
   );
 }
+
+/** A name of several words may break after each. */
+const breakable = (name) => name.split(/(?<=_)/).flatMap((word) => [word, el("wbr")]);
 
 function fill(cells, { by_method, methods }) {
   const first = methods.find((name) => by_method[name]);

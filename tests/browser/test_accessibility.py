@@ -103,10 +103,15 @@ def test_the_table_of_corners_fits_a_phone(phone: Visitor) -> None:
     page.get_by_role("tab", name="Corners").tap()
     expect(groups).to_have_count(1)
     assert heads.all_inner_texts() == ["x", "y", "σx", "σy", "area", "angle"]
+    expect(page.locator("#corner-units")).to_contain_text("σ in mm;")
     assert table.evaluate(fits)
     server.patch("settings", {"view": {"compare": True}})
     expect(groups).to_have_count(6)
     assert heads.all_inner_texts() == ["x", "y", *6 * ["area"], "angle"]
+    expect(page.locator("#corner-units")).to_have_text(
+        "Sensor frame: x, y in m; area of the 1σ ellipse in mm²"
+    )
+    assert [groups.nth(k).evaluate(LINES) for k in range(6)] == [1, 2, 1, 1, 1, 1]  # arras_ siegwart
     assert table.evaluate(fits)
     server.patch("settings", {"repeatability": {"running": True}})
     expect(page.locator("#answer-coverage_95-ml")).to_have_text(re.compile(r"^\d+.%$"))
@@ -117,6 +122,14 @@ def test_the_table_of_corners_fits_a_phone(phone: Visitor) -> None:
     expect(heads).to_have_count(2 + 6 * 3 + 1)
 
 
+LINES = """(head) => {
+  const tops = [...head.childNodes].filter((node) => node.nodeType === Node.TEXT_NODE).flatMap((node) => {
+    const text = document.createRange();
+    text.selectNodeContents(node);
+    return [...text.getClientRects()].map(({ top }) => Math.round(top));
+  });
+  return new Set(tops).size;
+}"""
 OVERFLOW_OF_THE_LONGEST = """(scroll) => {
   const put = (cells, text) => scroll.querySelectorAll(cells).forEach((cell) => cell.textContent = text);
   put("tbody :is(.x, .y)", "\u221212.345");
