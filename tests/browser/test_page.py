@@ -34,6 +34,16 @@ def test_page_loads_and_asks_only_this_machine(visitor: Visitor) -> None:
     visitor.check()
 
 
+def test_of_buttons_in_a_row_only_the_outer_corners_are_round(visitor: Visitor) -> None:
+    page = visitor.page
+    page.get_by_role("tab", name="Source").click()
+    buttons = page.locator("#kinds button")
+    expect(buttons).to_have_count(4)
+    radii = buttons.evaluate_all("nodes => nodes.map((node) => getComputedStyle(node).borderRadius)")
+    assert radii[1:-1] == ["0px", "0px"]
+    assert "0px" in radii[0] != "0px"
+
+
 @pytest.mark.long
 @pytest.mark.scene
 def test_scene_shows_the_room(visitor: Visitor) -> None:
