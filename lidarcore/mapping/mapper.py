@@ -101,15 +101,11 @@ class Mapper:
             self._take_distortion(refined)
             self._smooth_motion()
             refined = self._back.refine_again(parts)
-            refined = replace(refined, sweeps=self._sweeps(refined))
-        self._refined = refined
+        of_keyframes = [self._motions[number] for number in self._numbers]
+        scatter = np.array([motion.scatter for motion in of_keyframes])
+        share = kept(refined, np.array(self._locals), scatter)
+        self._refined = replace(refined, sweeps=np.array([motion.stands(share) for motion in of_keyframes]))
         self._loops = len(self._back.loops)
-
-    def _sweeps(self, refined: Refined) -> Array:
-        """(K, 3, 3) that poses of keyframes have besides: of where their scans stand."""
-        motions = [self._motions[number] for number in self._numbers]
-        share = kept(refined, np.array([motion.scatter for motion in motions]))
-        return np.array([motion.stands(share) for motion in motions])
 
     def _take_distortion(self, refined: Refined) -> None:
         """Let motions know what the surfaces that keyframes see again say of them."""
@@ -196,7 +192,7 @@ class Mapper:
         for number, (node, tie) in enumerate(self._ties):
             if number != self._numbers[node]:
                 matched[number] = tie.covariance - self._motions[number].sweep
-        sweeps = np.array([motion.stands(np.ones(3)) for motion in self._motions])
+        sweeps = np.array([motion.stands(1.0) for motion in self._motions])
         return Ties(nodes, poses, matched, np.array(self._driven), sweeps)
 
     @property
