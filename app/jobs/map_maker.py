@@ -16,6 +16,11 @@ from .landmark_store import LandmarkStore
 from .map_making import Making, MakingStatus
 from .map_name import stem_of
 
+NO_FILES = (
+    "No such map of a recording has files here: GET /map/making tells what is made and what has ended; files of the "
+    "last eight that were finished are kept."
+)
+NONE_MADE = "No such map of a recording is being made, or waits: GET /map/making tells which are."
 MOST = 8  # that wait; that are finished and kept, with their files; that have come to nothing and are told of
 
 
@@ -42,7 +47,7 @@ class MapMaker:
         with self._lock:
             finished = [one for one in self._ended if one.state == "finished" and id in (None, one.id)]
         if not finished:
-            raise NotFoundError("No such map of a recording is finished: make one first.")
+            raise NotFoundError(NO_FILES)
         made = finished[-1]
         assert made.session is not None
         return made.files, f"{stem_of(self._store.atlas, made.session)}-with-poses.zip"
@@ -66,7 +71,7 @@ class MapMaker:
             running = self._running if self._running and id in (None, self._running.id) else None
             waiting = [making for making in self._waiting if making.id == id]
             if not (running or waiting):
-                raise NotFoundError("No such map of a recording is being made, or waits.")
+                raise NotFoundError(NONE_MADE)
             for making in waiting:
                 self._waiting.remove(making)
                 making.cancel()

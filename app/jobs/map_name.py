@@ -22,6 +22,8 @@ def _numbered(session: int) -> str:
 
 
 def _plain(name: str) -> str:
-    """Letters, digits, - and _ of a name, of any script, with its blanks as -."""
-    kept = "".join(c for c in re.sub(r"\s", "-", name) if c in "-_" or unicodedata.category(c)[0] in "LMN")
+    """Letters, digits, - and _ of a name, of any script, with blanks, points and slashes as -."""
+    kept = "".join(
+        c for c in re.sub(r"[\s./\\]", "-", name) if c in "-_" or unicodedata.category(c)[0] in "LMN"
+    )
     return re.sub("-+", "-", kept)[:LONGEST].strip("-")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from lidarcore import Array, Features, Scan
 from lidarcore.clusters import Clusters
-from lidarcore.errors import LandmarkMapError
+from lidarcore.errors import LandmarkMapError, UnknownSessionError
 from lidarcore.geometry import check_covariance
 from lidarcore.localization import Navigator, as_pose
 from lidarcore.mapping import MapPicture, WholeScans
@@ -28,6 +28,7 @@ SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone poin
 Extent = tuple[tuple[float, float], tuple[float, float]]
 
 NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
+GONE = "There is no session {} any more: choose another map, or build one by SLAM."
 NOT_MOVED = (
     "A map of whole scans begins where its first scan was taken: POST /localization/reset starts a new map. "
     'To place the sensor, set navigation.method to "landmarks".'
@@ -239,7 +240,10 @@ class Navigation:
             navigator = self._navigator_in(session, settings)
             # The truth of a recording has a frame of its own, whatever map is used.
             own_frame = self._store.is_built(session) or timed.position.kind == "recording"
-        except LandmarkMapError as error:  # deleted meanwhile, or the file cannot be read
+        except UnknownSessionError:  # deleted meanwhile
+            self.problem = GONE.format(session)
+            return None
+        except LandmarkMapError as error:
             self.problem = str(error)
             return None
         if navigator is None:

@@ -32,7 +32,7 @@ export function mountMaking() {
   set("making", known({ making: null, waiting: [], ended: [] }));
   $("library-list").before(progress, queue, el("div", { id: "made" }));
   on(["making"], draw);
-  on(["connection", "panel"], (connection) => connection === "open" && ask()); // whoever may have begun one meanwhile
+  on(["connection", "panel", "sessionsRevision"], (connection) => connection === "open" && ask()); // whoever may have begun one meanwhile
 }
 
 /** Makes a map of a recording of the server's folder; of one with several lidars, of the one that is chosen. */

@@ -238,6 +238,7 @@ def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(drivi
     with driving.stream() as stream:
         state = stream.state(lambda s: s["localization"]["problem"])["localization"]
     assert f"no session {session}" in state["problem"]
+    assert "choose another map" in state["problem"]
     assert state["session"] is None
     assert "no session" in assert_problem(driving.http.get("/pose"), 404)["detail"]
     driving.change("PUT", "/localization/map", {"session": None})

@@ -5,7 +5,7 @@ import { attempt } from "../actions.js";
 import { request } from "../api.js";
 import { $, setText } from "../dom.js";
 import { isMapFirst } from "../mapped.js";
-import { get, set } from "../store.js";
+import { get, on, set } from "../store.js";
 import { degrees, metres, millimetres } from "../units.js";
 
 const PARALLEL = 0.35; // rad between walls from which on they have no distance: they meet
@@ -14,6 +14,20 @@ const MIXED = "One is only in the scan, the other only in the map: click two of 
 
 /** Whether clicks measure; the store has {clicked, first, second, found} as "measure", null while they select. */
 export const isMeasuring = () => Boolean(get("measure"));
+
+/** What was measured is forgotten where another map or source is shown: nothing need be there. */
+export function mountMeasure() {
+  on(["source", "localization"], ({ kind, name }, { mode, session }) => {
+    const now = [kind, name, mode, mode === "localize" && session].join();
+    if (now !== shown && get("measure")?.first) {
+      set("measure", {});
+      say();
+    }
+    shown = now;
+  });
+}
+
+let shown = ""; // source, and map that is localized in
 
 export function toggleMeasure() {
   set("measure", isMeasuring() ? null : {});

@@ -16,7 +16,7 @@ import { drawGrid, scaleBar } from "./grid.js";
 import { chosenAt, measurableAt, speckAt, thingsAt, wallsAt } from "./hits.js";
 import { showHover } from "./hover.js";
 import { drawMapped, drawMarks, drawPlace, drawPoints, drawWalls } from "./marks.js";
-import { drawMeasure, isMeasuring, measureFrom, toggleMeasure } from "./measure.js";
+import { drawMeasure, isMeasuring, measureFrom, mountMeasure, toggleMeasure } from "./measure.js";
 import { CanvasPen, SvgPen } from "./pens.js";
 import { listen } from "./pointer.js";
 import { download, sheetScale, svgFile } from "./save.js";
@@ -51,6 +51,7 @@ export function mountOverlay() {
 function mountButtons() {
   for (const button of document.querySelectorAll(".scene-tools button, .bar button.icon")) button.title = button.getAttribute("aria-label");
   $("scene-tools").addEventListener("click", ({ target }) => unfold(target.closest("#view-tools") && !isUnfolded()));
+  mountMeasure();
   $("measure").addEventListener("click", toggleMeasure);
   $("fullscreen").addEventListener("click", () => (document.fullscreenElement ? document.exitFullscreen() : $("stage").requestFullscreen()));
   for (const kind of ["png", "svg"]) $(`save-${kind}`).addEventListener("click", () => saveView(kind));
