@@ -17,8 +17,8 @@ from .map_making import Making, MakingStatus
 from .map_name import stem_of
 
 NO_FILES = (
-    "No such map of a recording has files here: GET /map/making tells what is made and what has ended; files of the "
-    "last eight that were finished are kept."
+    "No such map of a recording has files here: make one first, or see in GET /map/making which have ended. Files of "
+    "the last eight that were finished are kept."
 )
 NONE_MADE = "No such map of a recording is being made, or waits: GET /map/making tells which are."
 MOST = 8  # that wait; that are finished and kept, with their files; that have come to nothing and are told of
@@ -109,6 +109,8 @@ class MapMaker:
 
     def _end(self, making: Making, code: int, message: str) -> None:
         """Keep the map whose process has ended well, and go on."""
+        if not making.path.exists():
+            message = f"{making.recording} was deleted or renamed before its map was made."
         session, error = self._kept(making) if code == 0 and making.state == "running" else (None, message)
         with self._lock:
             making.end(session, error)

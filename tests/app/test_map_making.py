@@ -210,6 +210,17 @@ def test_one_whose_process_cannot_be_started_fails_and_the_next_begins(server: S
     ]
 
 
+def test_of_a_recording_that_is_deleted_while_its_map_waits_that_is_told(server: Server) -> None:
+    for name in ("first.mcap", "gone.mcap"):
+        drive(server.folder / name, 30)
+        server.change("POST", MAKING, {"recording": name})
+    assert server.http.delete("/recordings/gone.mcap").is_success
+    wait_until(lambda: len(server.get(MAKING)["ended"]) == 2, "both have ended", LONGEST)
+    first, gone = server.get(MAKING)["ended"]
+    assert (first["state"], gone["state"]) == ("finished", "failed")
+    assert gone["error"] == "gone.mcap was deleted or renamed before its map was made."
+
+
 def test_the_end_of_a_server_ends_what_is_made_and_what_waits(make_server: Callable[..., Server]) -> None:
     server = make_server()
     for name in ("one.mcap", "two.mcap", "three.mcap"):
