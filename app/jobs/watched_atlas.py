@@ -1,9 +1,10 @@
 """The file of maps, which tells that the list of its sessions is another one: who shows it asks for it again."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from lidarcore.landmarks import Atlas, Landmark, LandmarkMap
+from lidarcore.landmarks import Atlas, LandmarkMap
 
 
 class WatchedAtlas(Atlas):
@@ -18,16 +19,9 @@ class WatchedAtlas(Atlas):
         self.revision = 0
         self.listeners: list[Callable[[], None]] = []
 
-    def begin(
-        self,
-        source: str,
-        started: float,
-        mode: str = "",
-        landmarks: Iterable[Landmark] = (),
-        name: str = "",
-    ) -> LandmarkMap:
+    def begin(self, *given: Any, **named: Any) -> LandmarkMap:
         """As that of Atlas, and so are the others."""
-        begun = super().begin(source, started, mode, landmarks, name)
+        begun = super().begin(*given, **named)
         self._changed()
         return begun
 
