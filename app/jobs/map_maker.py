@@ -1,6 +1,7 @@
 """Recordings become maps one after the other, each in a process of its own, as `lidarcore map` finishes them."""
 
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from itertools import count
@@ -25,9 +26,15 @@ MOST = 8  # that wait; that are finished and kept, with their files; that have c
 
 
 class MapMaker:
-    """Makes maps of recordings, and keeps them in a store. Every method may be called from any thread."""
+    """Makes maps of recordings, and keeps them in a store. Every method may be called from any thread.
+
+    revision   another number whenever one was asked for, has begun or ended: who shows them asks again
+    listeners  called after each, in the thread that made the change; they must not wait
+    """
 
     def __init__(self, store: LandmarkStore) -> None:
+        self.revision = 0
+        self.listeners: list[Callable[[], None]] = []
         self._store = store
         self._ids = count(1)
         self._waiting: list[Making] = []
@@ -63,6 +70,7 @@ class MapMaker:
             making = Making.of(next(self._ids), path, topic, scans, settings)
             self._waiting.append(making)
             self._go_on()
+            self._changed()
             return making.status()
 
     def cancel(self, id: int | None = None) -> None:
@@ -78,6 +86,7 @@ class MapMaker:
                 self._keep(making)
             if running:
                 running.state = "cancelled"  # it has ended once its process has
+            self._changed()
         if running and running.process:
             running.process.kill()
 
@@ -119,6 +128,12 @@ class MapMaker:
             self._keep(making)
             self._running = None
             self._go_on()
+            self._changed()
+
+    def _changed(self) -> None:
+        self.revision += 1
+        for listener in self.listeners:
+            listener()
 
     def _kept(self, making: Making) -> tuple[int | None, str | None]:
         """The session that a map has become, or why it has not."""

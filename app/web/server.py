@@ -62,8 +62,9 @@ DESCRIPTION = """2D lidar scans to walls, corners and their covariances. Metres,
 Errors are problem details (RFC 9457).
 
 `WebSocket /api/v1/stream` (`?points=true` adds the measured points) sends JSON objects with a member `type`:
-`state` at first and after every change, with settings, source, selection, localization, recorder, ready and
-sessions_revision, another number whenever `GET /api/v1/sessions` has another list;
+`state` at first and after every change, with settings, source, selection, localization, recorder, ready,
+sessions_revision, another number whenever `GET /api/v1/sessions` has another list, and making_revision, another one
+whenever a map of a recording in `GET /api/v1/map/making` was asked for, has begun or ended;
 `frame` with the members of `GET /api/v1/frame`; `landmarks` with what has changed in the map of a session; `walls`,
 about once a second, with all walls of the map of whole scans, as in `GET /api/v1/walls`, and their `corners`. A slow
 client gets fewer frames, never old ones. A client may send `{"type": "odometry", "stamp": ..., "x": ..., "y": ...,

@@ -76,14 +76,14 @@ class State:
         self._scene = Scene(self.viser.server)
         self.runtime = Runtime(first, options.settings, Navigation(self.landmarks), self._scene.draw, setups)
         self.metrics = Metrics()
-        self.hub = Hub(self.runtime, self.recorder, self.landmarks, self.metrics.sent)
+        self.map_maker = MapMaker(self.landmarks)
+        self.hub = Hub(self.runtime, self.recorder, self.landmarks, self.map_maker, self.metrics.sent)
         self.metrics.observe(self.runtime, self.hub, self.recorder)
         self.repeatability = LiveRepeatability()
         self.calibration = LiveCalibration(self.runtime.player, lambda: self.runtime.ready)
         self.runtime.frame_listeners += [self.repeatability.observe, self.calibration.observe]
         self.runtime.change_listeners.append(self.calibration.check_source)
         self.studies = Studies(folder / STUDIES)
-        self.map_maker = MapMaker(self.landmarks)
         self.profiles = Profiles(folder / PROFILES)
         self.library = Library(
             options.recordings, options.max_bytes, options.recording, in_use=self._files_in_use

@@ -15,6 +15,7 @@ from lidarcore.mapping.walls import WallTable
 
 from ..errors import explained
 from ..jobs.landmark_store import LandmarkStore
+from ..jobs.map_maker import MapMaker
 from ..jobs.recorder import AsyncRecorder
 from ..jobs.session_writer import MapChange
 from ..pipeline.frame import Frame
@@ -113,17 +114,19 @@ class Hub:
         runtime: Runtime,
         recorder: AsyncRecorder,
         landmarks: LandmarkStore,
+        map_maker: MapMaker,
         sent: Callable[[Frame], None],
     ) -> None:
         """`sent` is told of every frame that was handed to a browser's socket."""
-        self._runtime, self._recorder, self._landmarks, self._sent = runtime, recorder, landmarks, sent
+        self._runtime, self._recorder, self._sent = runtime, recorder, sent
+        self._landmarks, self._map_maker = landmarks, map_maker
         self._mailboxes: set[Mailbox] = set()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._session: int | None = None  # that was written to last
         self._walls: WallTable | None = None  # of the map that the newest frame shows
         runtime.frame_listeners.append(self._shown)
         landmarks.listeners.append(self._written)
-        for listeners in (runtime.change_listeners, landmarks.atlas.listeners):
+        for listeners in (runtime.change_listeners, landmarks.atlas.listeners, map_maker.listeners):
             listeners.append(lambda: self._post(Mailbox.put_state))
 
     @property
@@ -150,6 +153,7 @@ class Hub:
             "recorder": self._recorder.status,
             "ready": runtime.ready,
             "sessions_revision": self._landmarks.atlas.revision,
+            "making_revision": self._map_maker.revision,
         }
         return _message("state", to_json(state).decode())
 

@@ -131,6 +131,7 @@ function accept(state) {
   set("recorder", state.recorder);
   set("ready", state.ready);
   set("sessionsRevision", state.sessions_revision);
+  set("makingRevision", state.making_revision);
   known();
 }
 

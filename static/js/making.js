@@ -32,7 +32,16 @@ export function mountMaking() {
   set("making", known({ making: null, waiting: [], ended: [] }));
   $("library-list").before(progress, queue, el("div", { id: "made" }));
   on(["making"], draw);
-  on(["connection", "panel", "sessionsRevision"], (connection) => connection === "open" && ask()); // whoever may have begun one meanwhile
+  on(["connection", "panel", "makingRevision"], follow);
+}
+
+let followed = ""; // what was known when it was last asked for: states come twice a second
+
+/** Asks when somebody has let one be made, or one has ended, and when someone looks. */
+function follow(connection, panel, revision) {
+  const wanted = [connection, panel, revision].join(" ");
+  if (connection === "open" && wanted !== followed) ask();
+  followed = wanted;
 }
 
 /** Makes a map of a recording of the server's folder; of one with several lidars, of the one that is chosen. */
@@ -56,7 +65,7 @@ async function cancel(id) {
 
 let timer = 0;
 
-/** Asks how far it is, again and again while it runs, whoever began it. */
+/** Asks how far it is, again and again while it runs and someone looks, whoever began it. */
 async function ask() {
   clearTimeout(timer);
   const found = await request("GET", STATUS).catch(() => null);
@@ -64,7 +73,7 @@ async function ask() {
   if (!found) return;
   const before = get("making");
   set("making", known(found));
-  if (isRunning(found)) timer = setTimeout(ask, ASK_MS);
+  if (isRunning(found) && get("panel") === "sources") timer = setTimeout(ask, ASK_MS);
   const isNew = ({ id }) => before.making && !before.ended.some((one) => one.id === id);
   found.ended.filter(isNew).forEach(tell);
 }

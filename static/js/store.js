@@ -1,7 +1,7 @@
 // What the page knows, by key: what the server streams (settings, source, selection, localization, recorder, ready,
-// sessionsRevision, frame), what was asked for (methods, clusterers, fields, simulation, repeatability, ...) and what the page itself is
-// doing (connection, opening, panel, ...). Modules read it and are called after changes, once per animation frame, so a
-// hidden page does no work.
+// sessionsRevision, makingRevision, frame), what was asked for (methods, clusterers, fields, simulation, repeatability, ...)
+// and what the page itself is doing (connection, opening, panel, ...). Modules read it and are called after changes, once
+// per animation frame, so a hidden page does no work.
 
 const values = {};
 const listeners = new Set();

@@ -34,8 +34,8 @@ def test_first_comes_the_state_then_the_newest_frame(server: Server) -> None:
     with server.stream() as stream:
         state, frame = stream.message(), stream.message()
     assert state["type"] == "state"
-    told = {"settings", "source", "selection", "localization", "recorder", "ready", "sessions_revision"}
-    assert state.keys() == {"type", *told}
+    told = {"settings", "source", "selection", "localization", "recorder", "ready"}
+    assert state.keys() == {"type", *told, "sessions_revision", "making_revision"}
     assert state["settings"] == server.get("/settings")
     assert state["source"].keys() == server.get("/source").keys()
     assert state["recorder"] == server.get("/recorder")
@@ -101,6 +101,18 @@ def test_another_list_of_sessions_is_told_of_by_another_number(server: Server) -
         assert is_told()
         assert_problem(server.http.delete(f"/sessions/{id}"), 404)
         assert atlas.revision == known
+
+
+def test_maps_of_recordings_that_are_asked_for_begin_or_end_are_told_of_by_another_number(
+    server: Server, room: Path
+) -> None:
+    with server.stream() as stream:
+        known = stream.state()["making_revision"]
+        server.change("POST", "/map/making", {"recording": room.name})
+        begun = stream.state(lambda state: state["making_revision"] > known)["making_revision"]
+        server.http.delete("/map/making").raise_for_status()
+        told = stream.state(lambda state: state["making_revision"] >= begun + 2)
+        assert told  # that it is cancelled, and that its process has ended
 
 
 def test_every_change_is_told_to_every_client(server: Server, room: Path) -> None:

@@ -206,3 +206,27 @@ def test_a_map_that_takes_too_long_is_cancelled(visitor: Visitor) -> None:
     page.locator("#making-progress").get_by_role("button", name="Cancel").click()
     expect(page.locator("#making-progress")).to_be_hidden()
     assert visitor.server.get("map/making")["making"]["state"] == "cancelled"
+
+
+def test_a_map_that_others_let_be_made_is_followed_and_can_be_cancelled(visitor: Visitor) -> None:
+    """While a recording stands still the stream tells of nothing else, and when none is made nobody asks for one."""
+    page, server = visitor.page, visitor.server
+    server.show(ROOT / "app" / "demo" / WINDSOR, 0)
+    visitor.catch_up()
+    page.get_by_role("tab", name="Source").click()
+    progress = page.locator("#making-progress")
+    expect(progress).to_be_hidden()
+    server.api.post("map/making", json={"recording": DEMO}).raise_for_status()
+    expect(progress.locator("output")).to_have_text(re.compile(rf"Map of {DEMO}: [1-9]\d* of \d+ scans"))
+    server.api.post("map/making", json={"recording": WINDSOR}).raise_for_status()
+    expect(page.locator("#making-queue li")).to_have_text([f"Map of {WINDSOR}: waiting"])
+    server.api.delete("map/making").raise_for_status()
+    expect(progress.locator("output")).to_contain_text(f"Map of {WINDSOR}")
+    progress.get_by_role("button", name="Cancel").click()
+    expect(progress).to_be_hidden()
+    server.emulate()
+    wait_until(lambda: server.get("map/making")["making"]["state"] == "cancelled", "it has ended")
+    page.wait_for_timeout(1000)
+    asked = sum("map/making" in url for url in visitor.asked)
+    page.wait_for_timeout(2000)
+    assert sum("map/making" in url for url in visitor.asked) == asked
