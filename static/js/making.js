@@ -120,11 +120,27 @@ const isLast = ({ state, recording }, place, ended) =>
 
 const kept = () => el("p", { class: "muted" }, "The server keeps the files of the last eight until it ends.");
 
-function outcome({ id, recording, state, session, error, elapsed_s: took }) {
+/** Saves the files if the server still has them: of a download that fails a browser says nothing. */
+async function save(event, { id, session, recording }) {
+  event.preventDefault();
+  const { href } = event.currentTarget;
+  const found = await attempt(() => request("GET", STATUS), "The files cannot be saved");
+  if (!found) return;
+  const isKept = found.ended.some((one) => one.id === id && one.session === session);
+  if (isKept) return el("a", { href, download: "" }).click(); // named by the server
+  toast(`The server keeps them of the last eight maps until it ends. Make the map of ${recording} once more to save them.`, {
+    title: "These files are gone",
+    kind: "error",
+  });
+}
+
+function outcome(made) {
+  const { id, recording, state, session, error, elapsed_s: took } = made;
   if (state === "failed") return [el("p", { class: "fault", role: "alert" }, `No map of ${recording}: ${error}`)];
   if (state !== "finished") return [];
   const href = address(`${STATUS}/files?id=${id}`).href;
   const words = "Save all files, with the poses";
-  const files = el("a", { href, download: "", "aria-label": `${words}, of map ${session}` }, words); // named by the server
+  const onclick = (event) => save(event, made);
+  const files = el("a", { href, download: "", "aria-label": `${words}, of map ${session}`, onclick }, words);
   return [el("p", { class: "muted" }, `Map ${session} of ${recording}, made in ${duration(took)}. `, files)];
 }

@@ -4,6 +4,7 @@ import io
 import json
 import re
 from collections.abc import Callable
+from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
@@ -230,3 +231,32 @@ def test_a_map_that_others_let_be_made_is_followed_and_can_be_cancelled(visitor:
     asked = sum("map/making" in url for url in visitor.asked)
     page.wait_for_timeout(2000)
     assert sum("map/making" in url for url in visitor.asked) == asked
+
+
+def test_files_that_the_server_no_longer_keeps_are_told_of(
+    visit: Callable[..., Visitor], tmp_path: Path
+) -> None:
+    """It started anew while the page stood still, which had seen it otherwise."""
+    own = Server(tmp_path)
+    own.start()
+    visitor = visit(at=own)
+    visitor.tolerated += ["net::ERR_", "WebSocket", "Failed to fetch"]
+    page = visitor.page
+    try:
+        page.clock.install()
+        visitor.open()
+        page.get_by_role("tab", name="Source").click()
+        page.get_by_role("button", name=f"Make a map of {DEMO}").click()
+        link = page.get_by_role("link", name="Save all files, with the poses")
+        expect(link).to_be_visible()
+        page.clock.pause_at(page.evaluate("Date.now() + 1000"))
+        own.kill()
+        link.click()
+        expect(page.locator(".toast")).to_contain_text("No answer from the server")
+        own.start()
+        link.click()
+        gone = page.locator(".toast", has_text="These files are gone")
+        expect(gone).to_contain_text(f"Make the map of {DEMO} once more")
+        assert page.url.startswith(own.url)
+    finally:
+        own.kill()
