@@ -32,7 +32,7 @@ export function setIcon(button, name) {
 export function iconButton(name, label, onclick) {
   return el(
     "button",
-    { type: "button", class: "icon", "aria-label": label, title: label, onclick },
+    { type: "button", class: "icon", "aria-label": label, title: label, "data-key": label, onclick },
     icon(name),
   );
 }
@@ -44,14 +44,38 @@ export function swatch(method) {
   return patch;
 }
 
-/** Makes a node's children anew only when what they show has changed: until then focus and open lists stay. */
+/**
+ * Makes a node's children anew only when what they show has changed: until then focus and open lists stay. The focus goes
+ * to what has the same key, of a row that has gone to the one in its place.
+ */
 export function remake(node, shown, make) {
   const key = JSON.stringify(shown);
   if (node.shown === key) return;
   node.shown = key;
-  const held = node.contains(document.activeElement) ? document.activeElement.dataset.key : null;
+  const held = node.contains(document.activeElement) ? document.activeElement : null;
+  const place = [...node.querySelectorAll("li")].indexOf(held?.closest("li"));
   node.replaceChildren(...make());
-  if (held) node.querySelector(`[data-key="${CSS.escape(held)}"]`)?.focus();
+  if (!held || held.isConnected) return;
+  const again = keyed(node, held.dataset.key);
+  if (again) again.focus();
+  else if (place >= 0) focusRow(node, place);
+}
+
+/** The control with a key, as `remake` makes it once more. */
+export const keyed = (node, key) => node.querySelector(`[data-key="${CSS.escape(key)}"]`);
+
+function focusRow(node, place) {
+  const rows = node.querySelectorAll("li");
+  const row = rows[Math.min(place, rows.length - 1)];
+  if (row) row.querySelector("button, input").focus();
+  else focusHeading(node);
+}
+
+/** Where to go on in a section in which the last thing to press has gone. */
+export function focusHeading(node) {
+  const heading = node.closest("section").querySelector("h2");
+  heading.tabIndex = -1;
+  heading.focus();
 }
 
 /** Writes text only where it differs, into the text node that is there: nothing is laid out for an equal value. */

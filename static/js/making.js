@@ -3,7 +3,7 @@
 
 import { address, Problem, request } from "./api.js";
 import { attempt } from "./actions.js";
-import { $, el, iconButton, remake, setText } from "./dom.js";
+import { $, el, focusHeading, iconButton, keyed, remake, setText } from "./dom.js";
 import { localizeIn } from "./maps.js";
 import { get, on, set } from "./store.js";
 import { report, toast } from "./toasts.js";
@@ -43,6 +43,9 @@ function follow(connection, panel, revision) {
   if (connection === "open" && wanted !== followed) ask();
   followed = wanted;
 }
+
+/** What the button that makes a map of a recording says. */
+export const makingWords = (recording) => `Make a map of ${recording}`;
 
 /** Makes a map of a recording of the server's folder; of one with several lidars, of the one that is chosen. */
 export async function makeMap(recording, topic = undefined) {
@@ -91,7 +94,9 @@ function tell({ recording, state, session, error }) {
 
 function draw(found) {
   const { making, waiting, ended } = found;
+  const isHeld = progress.contains(document.activeElement);
   progress.hidden = !isRunning(found);
+  if (isHeld && progress.hidden) leave(making?.recording);
   if (isRunning(found)) {
     const { done, total } = making;
     if (total) bar.value = Math.min(done / total, 1);
@@ -101,6 +106,13 @@ function draw(found) {
   queue.hidden = !waiting.length;
   remake(queue, waiting, () => waiting.map(waitingLine));
   remake($("made"), ended, () => [...ended.filter(isLast).flatMap(outcome), ...(ended.some(isFinished) ? [kept()] : [])]);
+}
+
+/** Where to go on after "Cancel" has gone with what was made: its recording. */
+function leave(recording) {
+  const again = keyed($("library-list"), makingWords(recording));
+  if (again) again.focus();
+  else focusHeading(progress);
 }
 
 function waitingLine({ id, recording }) {

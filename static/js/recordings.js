@@ -6,7 +6,7 @@ import { $, el, icon, iconButton, remake } from "./dom.js";
 import { attempt, open } from "./actions.js";
 import { get, on, set } from "./store.js";
 import { toast } from "./toasts.js";
-import { makeMap } from "./making.js";
+import { makeMap, makingWords } from "./making.js";
 import { renameForm } from "./renaming.js";
 import { bytes, duration } from "./units.js";
 
@@ -83,7 +83,7 @@ function row(recording, playing, renaming) {
   );
   if (isPlaying) button.setAttribute("aria-current", "true");
   const about = el("p", { class: "about muted" }, aboutOf(recording));
-  const map = iconButton("map", `Make a map of ${name}`, () => makeMap(name));
+  const map = iconButton("map", makingWords(name), () => makeMap(name));
   return el("li", {}, button, map, downloadLink(name), ...(builtin ? [] : changeButtons(name, isPlaying)), about);
 }
 

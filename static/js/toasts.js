@@ -1,7 +1,7 @@
 // Messages that come and go, read out by screen readers. One that is pointed at or has the focus stays. Where there is
 // little room, only the newest is seen, with how many more there are.
 
-import { $, el, iconButton } from "./dom.js";
+import { $, el, iconButton, keyed } from "./dom.js";
 
 const QUESTION_MS = 30_000; // for messages that ask something
 const LINGER_MS = 12_000;
@@ -54,11 +54,17 @@ export function closeNewest() {
   return true;
 }
 
-/** The focus, if the message has it, goes back to where it was, or to the view where that has gone. */
+/** The focus, if the message has it, goes back to where it was. */
 function close(node) {
   const isHeld = node.contains(document.activeElement);
   node.remove();
-  if (isHeld) (before?.checkVisibility() ? before : $("stage"))?.focus({ preventScroll: true });
+  if (isHeld) giveBack(before);
+}
+
+/** Focuses a control, or what has taken its place in a list that was made anew; the view where there is neither. */
+function giveBack(control) {
+  const now = control?.isConnected ? control : control && keyed(document, control.dataset.key);
+  (now?.checkVisibility() ? now : $("stage"))?.focus({ preventScroll: true });
 }
 
 function removeLater(node, wait) {

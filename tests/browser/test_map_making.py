@@ -158,6 +158,24 @@ def test_a_question_takes_the_place_of_the_one_before(visit: Callable[..., Visit
     server.api.delete(f"sessions/{ids[0]}").raise_for_status()
 
 
+def test_who_deletes_maps_by_the_keyboard_goes_on_with_the_next_one(visitor: Visitor) -> None:
+    page, server = visitor.page, visitor.server
+    for one in server.get("sessions")["sessions"]:
+        server.api.delete(f"sessions/{one['id']}").raise_for_status()
+    first, second, third = (server.api.post("map", json=MAP).raise_for_status().json()["id"] for _ in "123")
+    page.get_by_role("tab", name="Map").click()
+    maps = page.get_by_role("region", name="Maps")
+    for id, focused in (
+        (second, maps.get_by_title(f"Localize in map {first}")),
+        (first, maps.get_by_title(f"Localize in map {third}")),
+        (third, maps.get_by_role("heading", name="Maps")),
+    ):
+        page.get_by_role("button", name=f"Delete map {id}", exact=True).press("Enter")
+        page.get_by_role("button", name="Delete", exact=True).press("Enter")
+        expect(page.get_by_title(f"Localize in map {id}")).to_have_count(0)
+        expect(focused).to_be_focused()
+
+
 def test_a_name_that_is_being_typed_stays_when_another_map_comes(visitor: Visitor) -> None:
     page, server = visitor.page, visitor.server
     id = server.api.post("map", json=MAP).raise_for_status().json()["id"]
@@ -189,8 +207,9 @@ def test_a_second_map_waits_for_the_first_one_and_can_be_given_up(visitor: Visit
     expect(page.locator("#making-progress output")).to_contain_text(f"Map of {DEMO}")
     expect(queue).to_have_text([f"Map of {WINDSOR}: waiting", f"Map of {COPY}: waiting"])
     expect(queue.last).to_be_in_viewport()
-    page.get_by_role("button", name=f"Do not make the map of {WINDSOR}").click()
+    page.get_by_role("button", name=f"Do not make the map of {WINDSOR}").press("Enter")
     expect(queue).to_have_text([f"Map of {COPY}: waiting"])
+    expect(page.get_by_role("button", name=f"Do not make the map of {COPY}")).to_be_focused()
     page.locator("#making-progress").get_by_role("button", name="Cancel").click()
     expect(page.locator("#making-progress output")).to_contain_text(f"Map of {COPY}")
     expect(queue).to_have_count(0)
@@ -204,9 +223,10 @@ def test_a_map_that_takes_too_long_is_cancelled(visitor: Visitor) -> None:
     page = visitor.page
     page.get_by_role("tab", name="Source").click()
     page.get_by_role("button", name=f"Make a map of {DEMO}").click()
-    page.locator("#making-progress").get_by_role("button", name="Cancel").click()
+    page.locator("#making-progress").get_by_role("button", name="Cancel").press("Enter")
     expect(page.locator("#making-progress")).to_be_hidden()
     assert visitor.server.get("map/making")["making"]["state"] == "cancelled"
+    expect(page.get_by_role("button", name=f"Make a map of {DEMO}")).to_be_focused()
 
 
 def test_a_map_that_others_let_be_made_is_followed_and_can_be_cancelled(visitor: Visitor) -> None:
