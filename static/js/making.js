@@ -4,7 +4,7 @@
 import { address, Problem, request } from "./api.js";
 import { attempt } from "./actions.js";
 import { $, el, focusHeading, iconButton, keyed, remake, setText } from "./dom.js";
-import { localizeIn } from "./maps.js";
+import { keyOf, listMaps, localizeIn } from "./maps.js";
 import { get, on, set } from "./store.js";
 import { report, toast } from "./toasts.js";
 import { chooseTopic } from "./topics.js";
@@ -78,7 +78,9 @@ async function ask() {
   set("making", known(found));
   if (isRunning(found) && get("panel") === "sources") timer = setTimeout(ask, ASK_MS);
   const isNew = ({ id }) => before.making && !before.ended.some((one) => one.id === id);
-  found.ended.filter(isNew).forEach(tell);
+  const ended = found.ended.filter(isNew);
+  if (ended.some(isFinished)) await listMaps();
+  ended.forEach(tell);
 }
 
 const isRunning = ({ making }) => making?.state === "running";
@@ -89,6 +91,7 @@ function tell({ recording, state, session, error }) {
   toast(`Made of all scans of ${recording}.`, {
     title: `Map ${session} is finished`,
     action: { label: "Localize in it", run: () => localizeIn(session) },
+    about: keyOf(session),
   });
 }
 

@@ -6,7 +6,7 @@ import { reloadLandmarks } from "./landmarks.js";
 import { attempt, changeSetting } from "./actions.js";
 import { renameForm } from "./renaming.js";
 import { get, on, set } from "./store.js";
-import { ask, toast } from "./toasts.js";
+import { ask, clearToasts, isToldOf, toast } from "./toasts.js";
 import { isOfScans } from "./pose.js";
 import { moment, wholeNumber } from "./units.js";
 import { zipped } from "./zip.js";
@@ -18,6 +18,7 @@ const OF_WALLS = { ...BUILDING, svg: "Plan, SVG", dxf: "Plan, DXF" };
 const BY_SERVER = ""; // what a file is saved as: the server names it after its map
 const LOADED = ["json", "csv", "geojson", "zip"];
 const MAX_NAME = 200; // characters
+const KEY = "map-";
 const OF_ROS = ["yaml", "yml", "pgm", "png", "bmp"]; // which come together
 
 const clearButton = el(
@@ -58,9 +59,11 @@ export function mountMaps() {
 
 let listed = ""; // when the maps were asked for: with which panel open, which map in use, how many walls in one that grows, and which list of sessions
 
+/** Asks while the list is seen, or a message is about one of them. */
 function refresh(panel, { session, mode }, { walls }, revision) {
   const wanted = [panel, session, mode, walls.length, revision].join(" ");
-  if (panel === "map" && listed !== wanted) list();
+  const isSeen = panel === "map" || isToldOf(KEY);
+  if (isSeen && listed !== wanted) listMaps();
   listed = wanted;
 }
 
@@ -76,12 +79,23 @@ const begun = (words) => words[0].toUpperCase() + words.slice(1);
 let asked = 0;
 let answered = 0;
 
-async function list() {
+/** Asks which maps there are. */
+export async function listMaps() {
   const number = ++asked;
   const maps = await attempt(() => request("GET", "sessions"), "The maps could not be listed");
   if (!maps || number < answered) return; // an answer that was overtaken
   answered = number;
+  const before = get("maps")?.sessions ?? [];
   set("maps", maps);
+  before.filter(({ id }) => !maps.sessions.some((session) => session.id === id)).forEach(forget);
+}
+
+/** Of a map that is gone nothing is asked or offered any more. */
+function forget(session) {
+  clearToasts(keyOf(session.id));
+  if (get("renamingMap") !== session.id) return;
+  set("renamingMap", null);
+  toast("It was deleted meanwhile, so it has no name to change.", { title: `${begun(called(session))} is gone` });
 }
 
 const NONE = "None yet. SLAM builds one, or load a file: landmarks, or a map of ROS.";
@@ -145,13 +159,14 @@ function row(session, live) {
   return el("li", {}, button, rename, ...(isBuilt ? [] : [remove]), el("p", { class: "about muted" }, about));
 }
 
-const keyOf = (id) => `map-${id}`;
+/** What its row is found by, and messages about it. */
+export const keyOf = (id) => `${KEY}${id}`;
 
 function renameMap(session) {
   const { id, name } = session;
   const rename = async (changed) => {
     const done = await attempt(() => request("PATCH", `sessions/${id}`, { name: changed }), "The map was not renamed");
-    if (done) await list();
+    if (done) await listMaps();
     return done;
   };
   const end = () => set("renamingMap", null);
@@ -188,6 +203,7 @@ function chooseMap(session) {
   ask("The map that SLAM builds is kept, but cannot be gone on with.", {
     title: `End SLAM, and localize in ${calledById(session)}?`,
     action: { label: "Localize", run: () => localizeIn(session) },
+    about: keyOf(session),
   });
 }
 
@@ -203,11 +219,12 @@ export async function localizeIn(session) {
 function confirmDelete(session, lost, isUsed) {
   const remove = async () => {
     await attempt(() => request("DELETE", `sessions/${session}`), "The map was not deleted");
-    await list();
+    await listMaps();
   };
   ask(`This also deletes its ${lost}.${isUsed ? " The sensor will no longer be localized in it." : ""}`, {
     title: `Delete ${calledById(session)}?`,
     action: { label: "Delete", run: remove },
+    about: keyOf(session),
   });
 }
 
@@ -216,12 +233,13 @@ function confirmClear(session) {
   const clear = async () => {
     if (get("settings").navigation.mode === "slam") await request("POST", "localization/reset");
     await request("DELETE", `landmarks?session=${session}`);
-    await Promise.all([list(), reloadLandmarks()]);
+    await Promise.all([listMaps(), reloadLandmarks()]);
   };
   const isBuilt = get("settings").navigation.mode === "slam";
   ask(`This deletes its landmarks and their history.${isBuilt ? " SLAM starts again with an empty map." : ""}`, {
     title: `Clear ${calledById(session)}?`,
     action: { label: "Clear", run: () => attempt(clear, "The map was not cleared") },
+    about: keyOf(session),
   });
 }
 
@@ -237,10 +255,11 @@ async function load(files) {
   const query = new URLSearchParams({ format, name });
   const loaded = await attempt(() => send("POST", `map?${query}`, { body }), "The map could not be loaded");
   if (!loaded) return;
-  await list();
+  await listMaps();
   const action = { label: "Localize in it", run: () => localizeIn(loaded.id) };
   toast(`${name}: ${contentOf(loaded)}`, {
     title: `${begun(called(loaded))} is loaded`,
     action,
+    about: keyOf(loaded.id),
   });
 }

@@ -19,7 +19,7 @@ $("toasts").addEventListener("focusin", ({ relatedTarget: last }) => {
   if (!$("toasts").contains(last)) before = last;
 });
 
-/** Shows a message; `action` is an optional {label, run}, `about` what `clearToasts` clears it by. */
+/** Shows a message; `action` is an optional {label, run}, `about` what `clearToasts` clears it by, one or more words. */
 export function toast(text, { title = "", kind = "info", action = null, about = "", linger = LINGER_MS } = {}) {
   const region = $("toasts");
   const same = [...region.children].find((node) => node.dataset.text === title + text);
@@ -36,20 +36,23 @@ export function toast(text, { title = "", kind = "info", action = null, about = 
 }
 
 /** Asks something; an earlier question that has no answer yet is given up, lest the answer to one is taken for another's. */
-export function ask(text, { title, action }) {
+export function ask(text, { title, action, about = "" }) {
   clearToasts("question");
-  toast(text, { title, action, about: "question", linger: QUESTION_MS });
+  toast(text, { title, action, about: `question ${about}`, linger: QUESTION_MS });
 }
 
-/** Removes the messages about something that is settled: the "source", or the "connection". */
+/** Removes the messages about something that is settled, or gone: the "source", the "connection", "map-3". */
 export function clearToasts(about) {
-  for (const node of $("toasts").querySelectorAll(`[data-about="${about}"]`)) close(node);
+  for (const node of $("toasts").querySelectorAll(`[data-about~="${about}"]`)) close(node);
 }
+
+/** Whether a message is there about something whose word begins so: "map-". */
+export const isToldOf = (beginning) => Boolean($("toasts").querySelector(`[data-about*="${beginning}"]`));
 
 /** Closes the newest message, and says whether there was one; not while a question waits for its answer. */
 export function closeNewest() {
   const newest = $("toasts").lastElementChild;
-  if (!newest || $("toasts").querySelector('[data-about="question"]')) return false;
+  if (!newest || $("toasts").querySelector('[data-about~="question"]')) return false;
   close(newest);
   return true;
 }

@@ -280,3 +280,42 @@ def test_files_that_the_server_no_longer_keeps_are_told_of(
         assert page.url.startswith(own.url)
     finally:
         own.kill()
+
+
+def test_nothing_is_asked_or_offered_about_a_map_that_others_deleted(visitor: Visitor) -> None:
+    """Messages with a button, also where no list of maps is seen; questions; and the form of its name."""
+    page, api = visitor.page, visitor.server.api
+    toasts = page.locator(".toast")
+    stays = api.post("map", json=MAP).raise_for_status().json()["id"]
+
+    def loaded() -> int:
+        before = api.get("sessions").json()["sessions"][-1]["id"]
+        file = {"name": "hall.json", "mimeType": "application/json", "buffer": json.dumps(MAP).encode()}
+        page.locator("#map-file").set_input_files(file)
+        expect(page.get_by_role("button", name="Localize in it")).to_be_visible()
+        id = api.get("sessions").json()["sessions"][-1]["id"]
+        assert id > before
+        return id
+
+    page.get_by_role("tab", name="Map").click()
+    offered = loaded()
+    page.get_by_role("tab", name="Source").click()
+    api.delete(f"sessions/{offered}").raise_for_status()
+    expect(toasts).to_have_count(0)
+
+    page.get_by_role("tab", name="Map").click()
+    questioned = loaded()
+    page.get_by_role("button", name=f"Delete map {questioned}", exact=True).click()
+    expect(toasts).to_have_count(2)
+    api.delete(f"sessions/{questioned}").raise_for_status()
+    expect(toasts).to_have_count(0)
+
+    renamed = loaded()
+    page.get_by_role("button", name=f"Rename map {renamed}", exact=True).click()
+    page.get_by_label(f"New name of map {renamed}", exact=True).fill("Hall")
+    api.delete(f"sessions/{renamed}").raise_for_status()
+    expect(page.get_by_label(f"New name of map {renamed}", exact=True)).to_have_count(0)
+    expect(toasts).to_have_count(1)
+    expect(toasts).to_contain_text(f"Map {renamed} is gone")
+    expect(page.get_by_title(f"Localize in map {stays}")).to_be_focused()
+    api.delete(f"sessions/{stays}").raise_for_status()
