@@ -66,8 +66,8 @@ export const keyed = (node, key) => node.querySelector(`[data-key="${CSS.escape(
 
 function focusRow(node, place) {
   const rows = node.querySelectorAll("li");
-  const row = rows[Math.min(place, rows.length - 1)];
-  if (row) row.querySelector("button, input").focus();
+  const next = rows[Math.min(place, rows.length - 1)]?.querySelector("button, input");
+  if (next) next.focus();
   else focusHeading(node);
 }
 

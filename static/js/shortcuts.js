@@ -22,7 +22,7 @@ import {
 } from "./actions.js";
 import { get } from "./store.js";
 import { toggleTheme } from "./theme.js";
-import { closeNewest } from "./toasts.js";
+import { closeNewest, refuse } from "./toasts.js";
 
 const LAYERS = {
   p: "points",
@@ -67,7 +67,7 @@ const SHORTCUTS = [
     about: "Previous, next corner; landmark or wall of the map while that is open",
     run: (key) => nextThing()(key === "ArrowUp" ? -1 : 1),
   },
-  { keys: ["Escape"], about: "Stop setting the pose or measuring, close the newest message, or clear the selection", run: giveUp },
+  { keys: ["Escape"], about: "Answer a question with no, stop setting the pose or measuring, close the newest message, or clear the selection", run: giveUp },
   { keys: ["m"], about: "Off, SLAM, localize", run: nextMode },
   { keys: ["i"], about: "Set the pose by dragging", run: togglePlacing },
   { keys: ["d"], about: "Measure a distance", run: toggleMeasure },
@@ -133,7 +133,7 @@ function compareWith(digit) {
 
 /** The first of these that there is. */
 function giveUp() {
-  return cancelPlacing() || cancelMeasure() || closeNewest() || selectNothing();
+  return refuse() || cancelPlacing() || cancelMeasure() || closeNewest() || selectNothing();
 }
 
 function nextThing() {

@@ -5,7 +5,7 @@ import { on, set } from "./store.js";
 import { mountForms } from "./studies-forms.js";
 import { mountReports } from "./studies-reports.js";
 import { mountRun } from "./studies-run.js";
-import { clearToasts, report } from "./toasts.js";
+import { clearToasts, refuse, report } from "./toasts.js";
 
 const RUNNING_MS = 700;
 const IDLE_MS = 4000;
@@ -47,5 +47,6 @@ document.addEventListener("visibilitychange", () => {
   look();
   refresh();
 });
+document.addEventListener("keydown", ({ key }) => key === "Escape" && refuse());
 look();
 refresh();

@@ -35,9 +35,12 @@ export function toast(text, { title = "", kind = "info", action = null, about = 
   removeLater(node, linger);
 }
 
+let asker = null; // what had the focus when the question was asked
+
 /** Asks something; an earlier question that has no answer yet is given up, lest the answer to one is taken for another's. */
 export function ask(text, { title, action, about = "" }) {
   clearToasts("question");
+  asker = document.activeElement;
   toast(text, { title, action, about: `question ${about}`, linger: QUESTION_MS });
 }
 
@@ -49,12 +52,20 @@ export function clearToasts(about) {
 /** Whether a message is there about something whose word begins so: "map-". */
 export const isToldOf = (beginning) => Boolean($("toasts").querySelector(`[data-about*="${beginning}"]`));
 
-/** Closes the newest message, and says whether there was one; not while a question waits for its answer. */
+/** Answers a question with no, where one waits, and says whether one did; what asked has the focus again. */
+export function refuse() {
+  const question = $("toasts").querySelector('[data-about~="question"]');
+  if (!question) return false;
+  close(question);
+  giveBack(asker);
+  return true;
+}
+
+/** Closes the newest message, and says whether there was one. */
 export function closeNewest() {
   const newest = $("toasts").lastElementChild;
-  if (!newest || $("toasts").querySelector('[data-about~="question"]')) return false;
-  close(newest);
-  return true;
+  if (newest) close(newest);
+  return Boolean(newest);
 }
 
 /** The focus, if the message has it, goes back to where it was. */

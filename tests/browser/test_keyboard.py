@@ -144,21 +144,31 @@ def test_the_focus_returns_to_where_it_was_before_a_message_had_it(visitor: Visi
     expect(page.locator("#stage")).to_be_focused()
 
 
-def test_escape_closes_the_newest_message_unless_a_question_waits(visitor: Visitor) -> None:
+def test_escape_refuses_a_question_then_closes_the_newest_message_then_clears_the_selection(
+    visitor: Visitor,
+) -> None:
     page, server = visitor.page, visitor.server
     visitor.await_frame(server.pause())
     page.keyboard.press("ArrowDown")
     wait_until(lambda: visitor.knows("selection")["corner"], "a corner is selected")
-    tell(visitor, "first", "second")
-    page.keyboard.press("Escape")
-    expect(page.locator(".toast p")).to_have_text(["first"])
-    tell(visitor, "Delete it?", how="ask")
-    assert server.get("selection")["corner"]
-    page.keyboard.press("Escape")
-    wait_until(lambda: server.get("selection")["corner"] is None, "nothing is selected")
-    expect(page.locator(".toast p")).to_have_text(["first", "Delete it?"])
-    page.locator(".toast").last.get_by_role("button", name="Dismiss this message").click()
+    back = page.get_by_role("button", name="One scan back")
+    tell(visitor, "first")
+    for focused in (back, page.get_by_role("button", name="Go", exact=True).last):
+        back.focus()
+        tell(visitor, "Delete it?", how="ask")
+        tell(visitor, "second")
+        focused.focus()
+        page.keyboard.press("Escape")
+        expect(page.locator(".toast p")).to_have_text(["first", "second"])
+        expect(back).to_be_focused()
+        page.keyboard.press("Escape")
+        expect(page.locator(".toast p")).to_have_text(["first"])
     page.keyboard.press("?")
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog", name="Keyboard shortcuts")).to_be_hidden()
     expect(page.locator(".toast p")).to_have_text(["first"])
+    page.keyboard.press("Escape")
+    expect(page.locator(".toast")).to_have_count(0)
+    assert server.get("selection")["corner"]
+    page.keyboard.press("Escape")
+    wait_until(lambda: server.get("selection")["corner"] is None, "nothing is selected")

@@ -83,6 +83,11 @@ def test_a_study_is_run_and_its_report_read_in_the_page(studies: Callable[..., V
     expect(page.locator("#toasts")).to_contain_text(
         f"“Which ellipses can be believed?” ({name}) will be deleted from the server."
     )
+    page.keyboard.press("Escape")
+    expect(page.locator(".toast")).to_have_count(0)
+    delete = page.get_by_role("button", name=f"Delete {name}")
+    expect(delete).to_be_focused()
+    delete.click()
     page.get_by_role("button", name="Delete", exact=True).click()
     expect(page.get_by_text("None yet: run a study.")).to_be_visible()
     expect(page.locator("#viewer")).to_be_hidden()
