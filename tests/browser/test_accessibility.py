@@ -161,6 +161,40 @@ def test_messages_are_shown_one_at_a_time_on_a_phone(phone: Visitor) -> None:
     expect(page.locator("#toasts")).to_have_attribute("data-more", "")
 
 
+COVERED = """() => {
+  const messages = document.getElementById("toasts");
+  const places = [messages, document.getElementById("scene-tools")].map((node) => node.getBoundingClientRect());
+  const controls = [...document.querySelectorAll("button, a, select, input, summary, label, .chip")].filter(
+    (node) => node.checkVisibility() && !messages.contains(node) && !node.matches(".visually-hidden"));
+  const cover = (place, node) => {
+    const { left, right, top, bottom } = node.getBoundingClientRect();
+    return place.left < right && place.right > left && place.top < bottom && place.bottom > top;
+  };
+  return controls.filter((node) => places.some((place) => cover(place, node) && !node.closest("#scene-tools")))
+    .map((node) => node.outerHTML);
+}"""
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (390, 667), (844, 390)])
+def test_messages_cover_nothing_on_a_phone_that_can_be_tapped(
+    visit: Callable[..., Visitor], width: int, height: int
+) -> None:
+    page = visit(width, height, has_touch=True, is_mobile=True).open().page
+    page.get_by_role("tab", name="Setup").tap()
+    page.evaluate(TWO_MESSAGES)
+    expect(page.locator("#toasts")).to_have_attribute("data-more", "and 1 more")
+    assert page.evaluate(COVERED) == []
+    tools, messages = (page.locator(name).bounding_box() for name in ("#view-tools", "#toasts"))
+    is_beside = messages["x"] + messages["width"] <= tools["x"]
+    assert is_beside or messages["y"] + messages["height"] <= tools["y"]
+    panel = page.locator("#setup").bounding_box()
+    assert panel["y"] + panel["height"] == height
+    if height == 844:
+        page.locator("#view-tools").tap()
+        expect(page.locator("#save-svg")).to_be_visible()
+        assert page.evaluate(COVERED) == []
+
+
 def test_a_message_that_another_one_covers_on_a_phone_is_still_read_afterwards(
     visit: Callable[..., Visitor],
 ) -> None:
