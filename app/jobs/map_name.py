@@ -1,13 +1,18 @@
-"""What files of a map are named after."""
+"""What a map is called in messages, and what its files are named after."""
 
 import re
 import unicodedata
 from contextlib import suppress
 
 from lidarcore.errors import UnknownSessionError
-from lidarcore.landmarks import Atlas
+from lidarcore.landmarks import Atlas, Session
 
 LONGEST = 50  # characters: with an ending no more than the 255 bytes that file systems take, in any script
+
+
+def called(session: Session) -> str:
+    """A map as a sentence begins: "Hall (map 3)", or "Map 3" without a name."""
+    return f"{session.name} (map {session.id})" if session.name else f"Map {session.id}"
 
 
 def stem_of(atlas: Atlas, session: int) -> str:

@@ -4,7 +4,7 @@
 import { address, Problem, request } from "./api.js";
 import { attempt } from "./actions.js";
 import { $, el, focusHeading, iconButton, keyed, remake, setText } from "./dom.js";
-import { keyOf, listMaps, localizeIn } from "./maps.js";
+import { begun, calledById, keyOf, listMaps, localizeIn } from "./maps.js";
 import { get, on, set } from "./store.js";
 import { report, toast } from "./toasts.js";
 import { chooseTopic } from "./topics.js";
@@ -32,6 +32,7 @@ export function mountMaking() {
   set("making", known({ making: null, waiting: [], ended: [] }));
   $("library-list").before(progress, queue, el("div", { id: "made" }));
   on(["making"], draw);
+  on(["maps"], () => draw(get("making"))); // they may have other names
   on(["connection", "panel", "makingRevision"], follow);
 }
 
@@ -77,10 +78,9 @@ async function ask() {
   const before = get("making");
   set("making", known(found));
   if (isRunning(found) && get("panel") === "sources") timer = setTimeout(ask, ASK_MS);
-  const isNew = ({ id }) => before.making && !before.ended.some((one) => one.id === id);
-  const ended = found.ended.filter(isNew);
-  if (ended.some(isFinished)) await listMaps();
-  ended.forEach(tell);
+  const ended = found.ended.filter(({ id }) => !before.ended.some((one) => one.id === id));
+  if (ended.some(isFinished)) await listMaps(); // for their names
+  if (before.making) ended.forEach(tell);
 }
 
 const isRunning = ({ making }) => making?.state === "running";
@@ -89,7 +89,7 @@ function tell({ recording, state, session, error }) {
   if (state === "failed") toast(error, { title: `No map of ${recording}`, kind: "error" });
   if (state !== "finished") return;
   toast(`Made of all scans of ${recording}.`, {
-    title: `Map ${session} is finished`,
+    title: `${begun(calledById(session))} is finished`,
     action: { label: "Localize in it", run: () => localizeIn(session) },
     about: keyOf(session),
   });
@@ -108,7 +108,8 @@ function draw(found) {
   }
   queue.hidden = !waiting.length;
   remake(queue, waiting, () => waiting.map(waitingLine));
-  remake($("made"), ended, () => [...ended.filter(isLast).flatMap(outcome), ...(ended.some(isFinished) ? [kept()] : [])]);
+  const names = ended.filter(isFinished).map(({ session }) => calledById(session));
+  remake($("made"), [ended, names], () => [...ended.filter(isLast).flatMap(outcome), ...(ended.some(isFinished) ? [kept()] : [])]);
 }
 
 /** Where to go on after "Cancel" has gone with what was made: its recording. */
@@ -156,6 +157,6 @@ function outcome(made) {
   const href = address(`${STATUS}/files?id=${id}`).href;
   const words = "Save all files, with the poses";
   const onclick = (event) => save(event, made);
-  const files = el("a", { href, download: "", "aria-label": `${words}, of map ${session}`, onclick }, words);
-  return [el("p", { class: "muted" }, `Map ${session} of ${recording}, made in ${duration(took)}. `, files)];
+  const files = el("a", { href, download: "", "aria-label": `${words}, of ${calledById(session)}`, onclick }, words);
+  return [el("p", { class: "muted" }, `${begun(calledById(session))} of ${recording}, made in ${duration(took)}. `, files)];
 }

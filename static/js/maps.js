@@ -71,10 +71,10 @@ function refresh(panel, { session, mode }, { walls }, revision) {
 const called = ({ id, name }) => (name ? `${name} (map ${id})` : `map ${id}`);
 
 /** The same of a map that may be none of those listed. */
-const calledById = (id) => called(get("maps").sessions.find((session) => session.id === id) ?? { id });
+export const calledById = (id) => called(get("maps")?.sessions.find((session) => session.id === id) ?? { id });
 
 /** As a sentence begins. */
-const begun = (words) => words[0].toUpperCase() + words.slice(1);
+export const begun = (words) => words[0].toUpperCase() + words.slice(1);
 
 let asked = 0;
 let answered = 0;

@@ -214,6 +214,7 @@ def test_a_map_of_which_it_is_not_known_is_refused_with_the_reason(finished) -> 
     bare, damaged = (without_covariance(files, more) for more in ({}, {COVARIANCE_FILE: b"nonsense"}))
     loaded = server.http.post("/map", params={"format": "zip"}, content=bare).raise_for_status().json()["id"]
     assert f"loaded without {COVARIANCE_FILE}" in refused(server, 404, session=loaded)
+    assert f"Map {loaded} lacks that" in refused(server, 404, session=loaded)
     before = server.get("/sessions")["sessions"]
     problem = assert_problem(server.http.post("/map", params={"format": "zip"}, content=damaged), 422)
     assert f"{COVARIANCE_FILE}: " in problem["detail"]
@@ -222,7 +223,8 @@ def test_a_map_of_which_it_is_not_known_is_refused_with_the_reason(finished) -> 
     store = server.app.state.server.landmarks
     walls = store.atlas[session].walls()
     empty = store.atlas.begin("empty", 1.0)
-    assert "has no walls" in refused(server, 404, session=empty.session)
+    store.atlas.rename(empty.session, "Hall")
+    assert f"Hall (map {empty.session}) has no walls" in refused(server, 404, session=empty.session)
     empty.put_walls([replace(walls[0], id=id) for id in range(MOST_WALLS + 1)])
     assert f"more than {MOST_WALLS} walls" in refused(server, 404, session=empty.session)
     with closing(sqlite3.connect(server.get("/sessions")["store"]["path"])) as file, file:

@@ -27,8 +27,14 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     expect(page.locator("#making-progress")).to_be_hidden()
     expect(page.locator("#made")).to_contain_text("keeps the files of the last eight until it ends")
     session = server.get("map/making")["making"]["session"]
+    expect(page.locator(".toast")).to_contain_text(f"Emulated-s1 (map {session}) is finished")
+    server.patch(f"sessions/{session}", {"name": "Hall"})
+    expect(page.locator("#made")).to_contain_text(f"Hall (map {session}) of {DEMO}, made in")
+    server.patch(f"sessions/{session}", {"name": "emulated-s1"})
     with page.expect_download() as saved:
-        page.get_by_role("link", name="Save all files, with the poses").click()
+        page.get_by_role(
+            "link", name=f"Save all files, with the poses, of emulated-s1 (map {session})"
+        ).click()
     assert saved.value.suggested_filename == "emulated-s1-with-poses.zip"
     with ZipFile(io.BytesIO(saved.value.path().read_bytes())) as archive:
         poses = archive.read("poses.csv").decode().splitlines()

@@ -21,7 +21,7 @@ from lidarcore.mapping.walls import WallTable
 
 from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
-from ...jobs.map_name import stem_of
+from ...jobs.map_name import called, stem_of
 from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
 from .dependencies import Server
@@ -160,7 +160,7 @@ def _write(landmarks: LandmarkStore, landmark_map: LandmarkMap, path: Path, reso
     """The file of a map, in the format that its suffix says."""
     session, format = landmark_map.session, path.suffix.removeprefix(".")
     if format in PLANS:
-        path.write_text(_plan(landmarks.walls(session), session, format), "utf-8")
+        path.write_text(_plan(landmarks.walls(session), landmarks.atlas.session(session), format), "utf-8")
     elif format in PICTURES:
         joint = landmarks.joint_walls(session) if format == "zip" else None
         walls = landmarks.walls(session) if joint is None else joint
@@ -207,12 +207,12 @@ def _check_landmarks(session: Session) -> None:
     walls = f"walls, in the formats svg and dxf and at /walls?session={session.id}" if session.walls else ""
     if not session.landmarks and (grid or walls):
         has = ", and ".join(filter(None, (grid, walls)))
-        raise NotFoundError(f"Map {session.id} has no landmarks. It has {has}.")
+        raise NotFoundError(f"{called(session)} has no landmarks. It has {has}.")
 
 
-def _plan(walls: WallTable, session: int, format: str) -> str:
+def _plan(walls: WallTable, session: Session, format: str) -> str:
     if not len(walls):
-        raise NotFoundError(f"Map {session} has no walls: no floor plan can be drawn of it.")
+        raise NotFoundError(f"{called(session)} has no walls: no floor plan can be drawn of it.")
     return PLANS[format](walls.ends, corner_places(walls), np.empty((0, 2)))
 
 

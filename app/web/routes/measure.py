@@ -12,6 +12,7 @@ from lidarcore.mapping.walls import MOST_WALLS, JointWalls
 
 from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
+from ...jobs.map_name import called
 from ..places import MeasuredFeatureJson, Place, found_at
 from ..problems import ProblemError, documented
 from ..state import State
@@ -26,12 +27,12 @@ NO_WALLS = (
     "No map is shown whose walls can be measured: give the session of one that is kept, or set navigation.mode to slam "
     "and navigation.method to scans, and wait."
 )
-BEING_MADE = "Map {} is still being made: leave out session to measure it as it is now."
-BARE = "Map {} has no walls that can be measured: give the session of a map of whole scans."
-TOO_MANY = "Map {} has more than {} walls: of so many it is not kept how they err together."
+BEING_MADE = "{} is still being made: leave out session to measure it as it is now."
+BARE = "{} has no walls that can be measured: give the session of a map of whole scans."
+TOO_MANY = "{} has more than {} walls: of so many it is not kept how they err together."
 NOT_JOINT = (
-    "A map that is kept can be measured if it is known how its walls err together, and of map {} it is not: its making "
-    "was not finished, an older version kept it, or it was loaded without {}, which files of more than {} walls lack. "
+    "A map that is kept can be measured if it is known how its walls err together. {} lacks that: its making was not "
+    "finished, an older version kept it, or it was loaded without {}, which files of more than {} walls lack. "
     "Make it once more from its recording."
 )
 
@@ -112,14 +113,12 @@ def _kept(landmarks: LandmarkStore, session: int) -> JointWalls:
     return joint
 
 
-def _why_not(landmarks: LandmarkStore, session: int) -> str:
-    if landmarks.writes(session):
-        return BEING_MADE.format(session)
-    count = landmarks.atlas.session(session).walls
-    if not count:
-        return BARE.format(session)
-    return (
-        TOO_MANY.format(session, MOST_WALLS)
-        if count > MOST_WALLS
-        else NOT_JOINT.format(session, COVARIANCE_FILE, MOST_WALLS)
-    )
+def _why_not(landmarks: LandmarkStore, id: int) -> str:
+    session = landmarks.atlas.session(id)
+    if landmarks.writes(id):
+        return BEING_MADE.format(called(session))
+    if not session.walls:
+        return BARE.format(called(session))
+    if session.walls > MOST_WALLS:
+        return TOO_MANY.format(called(session), MOST_WALLS)
+    return NOT_JOINT.format(called(session), COVARIANCE_FILE, MOST_WALLS)
