@@ -40,8 +40,8 @@ NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."
 class LocalizationStatus:
     """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what.
 
-    A choice that was localized in ends when SLAM begins another map. SLAM goes by the method that is chosen, a known
-    map by what it holds: null before the first scan in it.
+    A choice that was localized in ends when SLAM begins another map, that of a map which is deleted with mode off. SLAM
+    goes by the method that is chosen, a known map by what it holds: null before the first scan in it.
     `extent` is that of the grid that is localized in, if it is one: from and to along x, then along y, m.
     """
 
@@ -66,6 +66,7 @@ class Navigation:
         self._store = store
         self._map: int | None = None
         self._is_map_used = False  # since it was chosen
+        self._is_map_gone = False
         self._run: Run | None = None
         self._placed: tuple[Array, ArrayLike] | None = None
         self._lock = threading.RLock()
@@ -84,7 +85,10 @@ class Navigation:
 
     @property
     def map(self) -> int | None:
-        """The session chosen to localize in; None for the newest. SLAM ends a choice that was used before."""
+        """The session chosen to localize in; None for the newest. SLAM ends a choice that was used before.
+
+        A choice of what is deleted ends, too, when it is localized in no longer.
+        """
         return self._map
 
     @property
@@ -120,15 +124,19 @@ class Navigation:
         if session is not None:
             self._store.is_built(session)
         with self._lock:
-            self._map, self._is_map_used = session, False
+            self._map, self._is_map_used, self._is_map_gone = session, False, False
             if self._run and self._run.known is not None:
                 self._drop_run()
 
     def leave_map(self, session: int) -> None:
-        """The map of a session is gone: whoever is localized in it is so no longer."""
+        """The map of a session is gone: whoever is localized in it is so no longer, and is told by the next scan."""
         with self._lock:
             if self._run and self._run.known == session:
                 self._drop_run()
+            elif (
+                self._map == session and self.problem is None
+            ):  # else whoever wants it is told that it is gone
+                self._map = None
 
     def reset(self) -> None:
         """Start over: SLAM with an empty map, localization from nothing."""
@@ -197,8 +205,9 @@ class Navigation:
             run.close()  # its map may be the one to localize in
         self._drop_run()
         self.problem = None
-        if wanted.mode == "slam" and self._is_map_used:
-            self._map, self._is_map_used = None, False  # what is built now is meant next
+        is_over = self._is_map_used if wanted.mode == "slam" else wanted.mode == "off" and self._is_map_gone
+        if is_over:
+            self.choose_map(None)  # what is built now is meant next, or the newest
         replay = (timed.name, wanted) if timed.position.kind == "recording" else None
         if wanted.mode == "slam" and wanted.method == "scans":
             navigator = WholeScans(settings.extraction, lambda: self._begin_walls(timed.name, replay))
@@ -241,6 +250,7 @@ class Navigation:
             # The truth of a recording has a frame of its own, whatever map is used.
             own_frame = self._store.is_built(session) or timed.position.kind == "recording"
         except UnknownSessionError:  # deleted meanwhile
+            self._is_map_gone = True
             self.problem = GONE.format(session)
             return None
         except LandmarkMapError as error:

@@ -42,6 +42,7 @@ export function mountLandmarks() {
   const fill = throttled(REDRAW_MS, drawTable);
   on(["landmarks"], ({ size }) => setText($("landmark-count"), `${wholeNumber(size)}${isPart ? "+" : ""}`));
   on(["landmarks", "frame", "panel"], (landmarks, _, panel) => panel === "map" && fill(landmarks));
+  on(["maps", "landmarks"], (_, landmarks) => fill(landmarks)); // without them there is another note
   on(["selection"], ({ landmark }) => rows.mark(landmark));
 }
 
@@ -101,6 +102,7 @@ function drawTable(landmarks) {
 function note(count) {
   if (count > MOST || isPart) return `Only the first ${MOST} are shown; saved files and the API have all of them.`;
   if (count) return "";
-  const isBuilt = session !== null || setting("navigation.mode") === "slam";
-  return isBuilt ? "No landmark is confirmed yet." : "There is no map. Switch to SLAM to build one.";
+  if (session !== null || setting("navigation.mode") === "slam") return "No landmark is confirmed yet.";
+  if (get("maps")?.sessions.length) return "No map is localized in. Choose one in Maps, or switch to SLAM to build one.";
+  return "There is no map. Switch to SLAM to build one.";
 }

@@ -15,6 +15,8 @@ from lidarcore.simulation.routes import Limits
 
 SPEED = Limits().speed  # m/s, at most
 SLAM = {"navigation": {"mode": "slam", "method": "landmarks"}}
+CORNER = {"x": 1, "y": 2, "var_x": 1e-4, "cov_xy": 0, "var_y": 1e-4, "kind": "corner"}
+ONE_CORNER = {"format": "lidarcore landmarks", "version": 1, "unit": "m", "landmarks": [CORNER]}
 ODOMETRY = {"stamp": 50.0, "x": 0.0, "y": 0.0, "heading": 0.0}
 
 
@@ -241,7 +243,13 @@ def test_a_map_that_is_deleted_while_it_is_localized_in_is_missed_in_words(drivi
     assert "choose another map" in state["problem"]
     assert state["session"] is None
     assert "no session" in assert_problem(driving.http.get("/pose"), 404)["detail"]
-    driving.change("PUT", "/localization/map", {"session": None})
+    assert state["map"] == session
+    driving.change("PATCH", "/settings", {"navigation": {"mode": "off"}})
+    wait_until(lambda: driving.get("/localization")["map"] is None, "it is what is chosen no longer")
+    chosen = driving.change("POST", "/map", ONE_CORNER)["id"]
+    driving.change("PUT", "/localization/map", {"session": chosen})
+    assert driving.http.delete(f"/sessions/{chosen}").status_code == 204
+    assert driving.get("/localization")["map"] is None
     driving.change("PATCH", "/settings", SLAM)
     located(driving, lambda where: where["mode"] == "slam")
 

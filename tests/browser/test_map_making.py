@@ -325,3 +325,25 @@ def test_nothing_is_asked_or_offered_about_a_map_that_others_deleted(visitor: Vi
     expect(toasts).to_contain_text(f"Map {renamed} is gone")
     expect(page.get_by_title(f"Localize in map {stays}")).to_be_focused()
     api.delete(f"sessions/{stays}").raise_for_status()
+
+
+def test_who_localized_in_a_map_that_is_deleted_is_told_to_choose_another_one(visitor: Visitor) -> None:
+    page, server = visitor.page, visitor.server
+    stays, goes = (server.api.post("map", json=MAP).raise_for_status().json()["id"] for _ in "12")
+    page.get_by_role("tab", name="Map").click()
+    page.get_by_title(f"Localize in map {goes}").click()
+    wait_until(lambda: server.get("localization")["session"] == goes, "it is localized in")
+    server.patch("source", {"state": "paused"})
+    page.get_by_role("button", name=f"Delete map {goes}", exact=True).click()
+    page.get_by_role("button", name="Delete", exact=True).click()
+    expect(page.locator("#pose-panel-state")).to_contain_text("choose another map")
+    expect(page.locator("#landmark-note")).to_have_text(
+        "No map is localized in. Choose one in Maps, or switch to SLAM to build one."
+    )
+    page.locator("#navigation .segments label", has_text="Off").click()
+    wait_until(lambda: server.get("localization")["map"] is None, "it is chosen no longer")
+    page.locator("#navigation .segments label", has_text="Localize").click()
+    wait_until(lambda: server.get("localization")["session"] == stays, "the newest is localized in")
+    for one in server.get("sessions")["sessions"]:
+        server.api.delete(f"sessions/{one['id']}").raise_for_status()
+    expect(page.locator("#landmark-note")).to_have_text("There is no map. Switch to SLAM to build one.")

@@ -70,4 +70,4 @@ def delete(server: Server, id: Annotated[int, Path(examples=[3])]) -> None:
             f"Session {id} is being written: reset localization to begin another one, or stop SLAM."
         )
     server.landmarks.atlas.delete(id)
-    server.runtime.navigation.leave_map(id)
+    server.runtime.navigate(lambda navigation: navigation.leave_map(id))
