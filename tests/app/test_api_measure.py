@@ -215,6 +215,7 @@ def test_a_map_of_which_it_is_not_known_is_refused_with_the_reason(finished) -> 
     loaded = server.http.post("/map", params={"format": "zip"}, content=bare).raise_for_status().json()["id"]
     assert f"loaded without {COVARIANCE_FILE}" in refused(server, 404, session=loaded)
     assert f"Map {loaded} lacks that" in refused(server, 404, session=loaded)
+    assert "It has no recording here" in refused(server, 404, session=loaded)
     before = server.get("/sessions")["sessions"]
     problem = assert_problem(server.http.post("/map", params={"format": "zip"}, content=damaged), 422)
     assert f"{COVARIANCE_FILE}: " in problem["detail"]
@@ -227,6 +228,13 @@ def test_a_map_of_which_it_is_not_known_is_refused_with_the_reason(finished) -> 
     assert f"Hall (map {empty.session}) has no walls" in refused(server, 404, session=empty.session)
     empty.put_walls([replace(walls[0], id=id) for id in range(MOST_WALLS + 1)])
     assert f"more than {MOST_WALLS} walls" in refused(server, 404, session=empty.session)
+    live, recorded = (
+        store.atlas.begin(source, 1.0, "slam") for source in ("RPLIDAR S1 emulated", "long.npz")
+    )
+    for one in (live, recorded):
+        one.put_walls(walls)
+    assert "It has no recording here: build another" in refused(server, 404, session=live.session)
+    assert "once more from its recording, long.npz" in refused(server, 404, session=recorded.session)
     with closing(sqlite3.connect(server.get("/sessions")["store"]["path"])) as file, file:
         file.execute(
             "UPDATE wall_covariances SET packed = substr(packed, 1, 40) WHERE session = ?", (session,)

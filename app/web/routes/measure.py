@@ -11,7 +11,6 @@ from lidarcore.mapping.export import COVARIANCE_FILE
 from lidarcore.mapping.walls import MOST_WALLS, JointWalls
 
 from ...errors import NotFoundError
-from ...jobs.landmark_store import LandmarkStore
 from ...jobs.map_name import called
 from ..places import MeasuredFeatureJson, Place, found_at
 from ..problems import ProblemError, documented
@@ -32,9 +31,10 @@ BARE = "{} has no walls that can be measured: give the session of a map of whole
 TOO_MANY = "{} has more than {} walls: of so many it is not kept how they err together."
 NOT_JOINT = (
     "A map that is kept can be measured if it is known how its walls err together. {} lacks that: its making was not "
-    "finished, an older version kept it, or it was loaded without {}, which files of more than {} walls lack. "
-    "Make it once more from its recording."
+    "finished, an older version kept it, or it was loaded without {}, which files of more than {} walls lack. {}"
 )
+FROM_RECORDING = "Make it once more from its recording, {}."
+AGAIN = "It has no recording here: build another one by SLAM and end it, or load it with that file."
 
 
 class MeasureJson(TypedDict):
@@ -98,27 +98,29 @@ def _map(server: State, session: int | None) -> JointWalls:
     """The walls of a map that is kept, or else of that which the page shows. Raises NotFoundError."""
     kept = asked_session(server, session)
     if kept is not None:
-        return _kept(server.landmarks, kept)
+        return _kept(server, kept)
     picture = server.runtime.newest().picture
     if picture is None or not isinstance(picture.walls, JointWalls):
         raise NotFoundError(NO_WALLS)
     return picture.walls
 
 
-def _kept(landmarks: LandmarkStore, session: int) -> JointWalls:
+def _kept(server: State, session: int) -> JointWalls:
     """The walls of a map that is kept. Raises NotFoundError, which says why they cannot be measured."""
-    joint = landmarks.joint_walls(session)
+    joint = server.landmarks.joint_walls(session)
     if joint is None:
-        raise NotFoundError(_why_not(landmarks, session))
+        raise NotFoundError(_why_not(server, session))
     return joint
 
 
-def _why_not(landmarks: LandmarkStore, id: int) -> str:
-    session = landmarks.atlas.session(id)
-    if landmarks.writes(id):
+def _why_not(server: State, id: int) -> str:
+    session = server.landmarks.atlas.session(id)
+    if server.landmarks.writes(id):
         return BEING_MADE.format(called(session))
     if not session.walls:
         return BARE.format(called(session))
     if session.walls > MOST_WALLS:
         return TOO_MANY.format(called(session), MOST_WALLS)
-    return NOT_JOINT.format(called(session), COVARIANCE_FILE, MOST_WALLS)
+    is_recorded = any(recording.name == session.source for recording in server.library.list())
+    remedy = FROM_RECORDING.format(session.source) if is_recorded else AGAIN
+    return NOT_JOINT.format(called(session), COVARIANCE_FILE, MOST_WALLS, remedy)
