@@ -4,7 +4,7 @@
 import { address, Problem, request } from "./api.js";
 import { attempt } from "./actions.js";
 import { $, el, focusHeading, iconButton, keyed, remake, setText } from "./dom.js";
-import { begun, calledById, keyOf, listMaps, localizeIn } from "./maps.js";
+import { begunById, calledById, keyOf, listMaps, localizeIn } from "./maps.js";
 import { get, on, set } from "./store.js";
 import { report, toast } from "./toasts.js";
 import { chooseTopic } from "./topics.js";
@@ -89,7 +89,7 @@ function tell({ recording, state, session, error }) {
   if (state === "failed") toast(error, { title: `No map of ${recording}`, kind: "error" });
   if (state !== "finished") return;
   toast(`Made of all scans of ${recording}.`, {
-    title: `${begun(calledById(session))} is finished`,
+    title: `${begunById(session)} is finished`,
     action: { label: "Localize in it", run: () => localizeIn(session) },
     about: keyOf(session),
   });
@@ -158,5 +158,5 @@ function outcome(made) {
   const words = "Save all files, with the poses";
   const onclick = (event) => save(event, made);
   const files = el("a", { href, download: "", "aria-label": `${words}, of ${calledById(session)}`, onclick }, words);
-  return [el("p", { class: "muted" }, `${begun(calledById(session))} of ${recording}, made in ${duration(took)}. `, files)];
+  return [el("p", { class: "muted" }, `${begunById(session)} of ${recording}, made in ${duration(took)}. `, files)];
 }

@@ -70,11 +70,13 @@ function refresh(panel, { session, mode }, { walls }, revision) {
 /** A map in a sentence: its name, where it has one, and its number. */
 const called = ({ id, name }) => (name ? `${name} (map ${id})` : `map ${id}`);
 
-/** The same of a map that may be none of those listed. */
-export const calledById = (id) => called(get("maps")?.sessions.find((session) => session.id === id) ?? { id });
+/** The same as a sentence begins: names stay as they are. */
+const begun = (map) => (map.name ? called(map) : `Map ${map.id}`);
 
-/** As a sentence begins. */
-export const begun = (words) => words[0].toUpperCase() + words.slice(1);
+/** The same of a map that may be none of those listed. */
+const byId = (id) => get("maps")?.sessions.find((session) => session.id === id) ?? { id };
+export const calledById = (id) => called(byId(id));
+export const begunById = (id) => begun(byId(id));
 
 let asked = 0;
 let answered = 0;
@@ -95,7 +97,7 @@ function forget(session) {
   clearToasts(keyOf(session.id));
   if (get("renamingMap") !== session.id) return;
   set("renamingMap", null);
-  toast("It was deleted meanwhile, so it has no name to change.", { title: `${begun(called(session))} is gone` });
+  toast("It was deleted meanwhile, so it has no name to change.", { title: `${begun(session)} is gone` });
 }
 
 const NONE = "None yet. SLAM builds one, or load a file: landmarks, or a map of ROS.";
@@ -258,7 +260,7 @@ async function load(files) {
   await listMaps();
   const action = { label: "Localize in it", run: () => localizeIn(loaded.id) };
   toast(`${name}: ${contentOf(loaded)}`, {
-    title: `${begun(called(loaded))} is loaded`,
+    title: `${begun(loaded)} is loaded`,
     action,
     about: keyOf(loaded.id),
   });

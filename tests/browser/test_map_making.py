@@ -27,7 +27,7 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     expect(page.locator("#making-progress")).to_be_hidden()
     expect(page.locator("#made")).to_contain_text("keeps the files of the last eight until it ends")
     session = server.get("map/making")["making"]["session"]
-    expect(page.locator(".toast")).to_contain_text(f"Emulated-s1 (map {session}) is finished")
+    expect(page.locator(".toast")).to_contain_text(f"emulated-s1 (map {session}) is finished")
     server.patch(f"sessions/{session}", {"name": "Hall"})
     expect(page.locator("#made")).to_contain_text(f"Hall (map {session}) of {DEMO}, made in")
     server.patch(f"sessions/{session}", {"name": "emulated-s1"})
