@@ -133,9 +133,7 @@ class Navigation:
         with self._lock:
             if self._run and self._run.known == session:
                 self._drop_run()
-            elif (
-                self._map == session and self.problem is None
-            ):  # else whoever wants it is told that it is gone
+            elif self._map == session and not self.problem:  # else whoever wants it is told that it is gone
                 self._map = None
 
     def reset(self) -> None:
