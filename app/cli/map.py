@@ -1,5 +1,6 @@
 """The command `lidarcore map`."""
 
+import errno
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -35,6 +36,9 @@ def map_recording(
         Literal["recorded", "none"],
         typer.Option(help="none leaves out what the recording says of the sensor's motion"),
     ] = "recorded",
+    replace: Annotated[
+        bool, typer.Option("--replace", help="replace the files of a map that is in the folder")
+    ] = False,
     topic: Topic = None,
     settings: SettingsFile = None,
     set_: Set = None,
@@ -50,6 +54,8 @@ def map_recording(
     from .map_run import build, without_odometry, write_files
 
     check_new_folder(output)
+    if not replace:
+        _check_free(output)
     chosen = settings_from(settings, set_)
     opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans", for_programs) as count:
@@ -63,3 +69,15 @@ def map_recording(
     )
     if built.left_out:
         typer.echo(f"Left out: {plural(len(built.left_out), 'scan')}, the first of them {built.left_out[0]}.")
+
+
+def _check_free(folder: Path) -> None:
+    """A map may be hours of work, and what people drew on its plan. Raises FileExistsError if the folder has one."""
+    from .map_run import files_of_a_map
+
+    if there := files_of_a_map(folder):
+        raise FileExistsError(
+            errno.EEXIST,
+            f"holds {there[0]} already; give another folder for --output, or replace the map there by --replace",
+            str(folder),
+        )

@@ -9,13 +9,15 @@ import numpy as np
 from lidarcore import Scan
 from lidarcore.errors import MotionError
 from lidarcore.mapping import Mapper, MapperSettings
-from lidarcore.mapping.export import write_map
+from lidarcore.mapping.export import COVARIANCE_FILE, MAP_FILES, write_map
 from lidarcore.mapping.grid import build_grid
 from lidarcore.mapping.walls import Walls, find_walls
 
 from ..pipeline.settings import Settings
 from ..pipeline.tables import csv_text
 from .localization_run import COLUMNS
+
+POSES = "poses.csv"
 
 
 @dataclass(frozen=True)
@@ -50,12 +52,17 @@ def build(scans: Iterable[Scan], settings: Settings, progress: Callable[[int], N
     return Built(mapper, states, left_out)
 
 
+def files_of_a_map(folder: Path) -> list[str]:
+    """Names of what is in a folder that the files of a map would replace, or that would no longer fit to them."""
+    return [name for name in (*MAP_FILES, COVARIANCE_FILE, POSES) if (folder / name).exists()]
+
+
 def write_files(folder: Path, built: Built, settings: Settings) -> Walls:
     """All files of the map, or none; its walls. Raises GridError or MapFileError."""
     views, poses = built.mapper.views, built.mapper.trajectory()[1]
     grid = build_grid(views.scans, views.poses)
     walls = find_walls(views.scans, views.poses, views.covariances, grid, extraction=settings.extraction)
-    write_map(folder, grid, walls, poses, {"poses.csv": poses_csv(built)})
+    write_map(folder, grid, walls, poses, {POSES: poses_csv(built)})
     return walls
 
 

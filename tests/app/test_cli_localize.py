@@ -12,6 +12,7 @@ from serving import ROOT, write_room
 
 from lidarcore import Scan, open_recording
 from lidarcore.geometry import compose, inverse
+from lidarcore.mapping.export import read_walls
 from lidarcore.mapping.grid import build_grid, write_ros_map
 from lidarcore.recordings.writer import RecordingWriter
 from lidarcore.simulation.robot import SimulatedRobot
@@ -140,6 +141,24 @@ def test_a_map_goes_into_a_folder_with_a_name(tmp_path: Path) -> None:
     refused = run("map", "no-recording.npz", "-o", "")
     assert refused.returncode == 2
     assert "the name of the folder is empty" in refused.stderr
+
+
+def test_a_map_takes_the_place_of_another_one_only_if_told_to(recording: Path, tmp_path: Path) -> None:
+    """Refused before the recording is opened; no file of the old map is left among those of the new one."""
+    drawn = tmp_path / "hall" / "plan.svg"
+    drawn.parent.mkdir()
+    drawn.write_text("an older plan")
+    (tmp_path / "hall" / "walls_covariance.bin").write_bytes(b"of the older walls")
+    (tmp_path / "hall" / "notes.txt").write_text("of somebody else")
+    refused = run("map", "no-recording.npz", "-o", drawn.parent)
+    assert_refused(refused, "hall: holds plan.svg already", "another folder for --output", "--replace")
+    assert drawn.read_text() == "an older plan"
+
+    made = run("map", recording, "-o", drawn.parent, "--replace", *NOISE)
+    assert made.returncode == 0, made.stderr
+    assert drawn.read_text().startswith("<svg")
+    assert read_walls(drawn.parent).length.sum() > 10
+    assert (tmp_path / "hall" / "notes.txt").exists()
 
 
 @pytest.mark.parametrize("text", ["", "\n\n"])
