@@ -115,8 +115,30 @@ def test_runs_that_would_be_one_and_the_same_are_refused(drive: Path, tmp_path: 
         result = CliRunner().invoke(cli, asked)
         assert result.exit_code == 2
         assert "Leave it out" in " ".join(result.output.split())
+    refused = CliRunner().invoke(cli, ["evaluate", "map", "none.npz", "--odometry", "none", "--seed", "7"])
+    assert refused.exit_code == 2
+    assert "--seed is for poor odometry" in " ".join(refused.output.split())
     asked = ["evaluate", "map", str(without), "--odometry", "recorded"]
     with pytest.raises(EvaluationError, match="has no odometry: choose auto, none, or poor"):
+        CliRunner().invoke(cli, asked, catch_exceptions=False)
+
+
+@pytest.mark.parametrize("option", ["--seed", "--seeds"])
+def test_poor_odometry_is_advised_only_where_there_is_a_reference_to_make_it_of(
+    drive: Path, tmp_path: Path, option: str
+) -> None:
+    with np.load(drive) as file:
+        arrays = {name: file[name] for name in file if name not in ("odometry", "truth")}
+    bare = tmp_path / "bare.npz"
+    np.savez(bare, **arrays)
+    refused = CliRunner().invoke(cli, ["evaluate", "map", str(bare), option, "3"])
+    assert refused.exit_code == 2
+    told = " ".join(refused.output.replace("│", " ").split())
+    assert f"{option} is for poor odometry" in told
+    assert "Leave it out: the recording has no reference poses" in told
+    assert "--odometry poor" not in told
+    asked = ["evaluate", "map", str(bare), "--odometry", "recorded"]
+    with pytest.raises(EvaluationError, match=r"has no odometry: choose auto or none\."):
         CliRunner().invoke(cli, asked, catch_exceptions=False)
 
 

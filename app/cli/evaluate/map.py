@@ -27,7 +27,10 @@ def evaluate_map(
             help="recorded, poor (3 % scale, 1 % a metre turn bias, noise), none; auto is what the recording allows"
         ),
     ] = "auto",
-    seed: Annotated[int, typer.Option(min=0, max=MOST, help="seed of the errors of poor odometry")] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, max=MOST, help="seed of the errors of poor odometry; 0 if not given"),
+    ] = None,
     seeds: Annotated[
         int,
         typer.Option(
@@ -47,19 +50,20 @@ def evaluate_map(
 ) -> None:
     """How far a map of a recording is from reference poses: relative poses, covariances, loops, time."""
     from lidarcore import open_recording
-    from lidarcore.evaluation.maps.accuracy import name_of_reference, read_relations
+    from lidarcore.evaluation.maps.accuracy import has_reference, name_of_reference, read_relations
     from lidarcore.evaluation.maps.study import is_drawn, prepared, study
 
     from ..map_run import mapper_settings
 
-    _check_seeds(seeds, odometry not in ("recorded", "none"))
+    drawing = "--seeds" if seeds > 1 else None if seed is None else "--seed"
+    _check_drawn(drawing, odometry not in ("recorded", "none"), has_reference=True)
     chosen = settings_from(settings, set_)
     sigmas = _sigmas(own)
     verified = None if relations is None else read_relations(relations)
     scans = list(open_recording(recording, topic, chosen.sensor.mask))
-    _check_seeds(seeds, odometry == "poor" or is_drawn(scans, odometry))
+    _check_drawn(drawing, odometry == "poor" or is_drawn(scans, odometry), has_reference(scans))
     typer.echo(f"{'reference':26} {name_of_reference(scans)}")
-    for number in range(seed, seed + seeds):
+    for number in range(seed or 0, (seed or 0) + seeds):
         given, reference = prepared(scans, odometry, number)
         with counting("scans") as count:
             judged = study(given, reference, mapper_settings(chosen), verified, sigmas, count)
@@ -69,12 +73,17 @@ def evaluate_map(
             typer.echo(f"{name:26} {value}")
 
 
-def _check_seeds(seeds: int, are_drawn: bool) -> None:
-    """Raises BadParameter if several runs are asked for that have no errors to be drawn."""
-    if seeds > 1 and not are_drawn:
+def _check_drawn(option: str | None, are_drawn: bool, has_reference: bool) -> None:
+    """Raises BadParameter if an option that says how errors are drawn is given where none are."""
+    if option is not None and not are_drawn:
+        cure = (
+            ", or choose --odometry poor."
+            if has_reference
+            else ": the recording has no reference poses, which poor odometry is made of."
+        )
         raise typer.BadParameter(
-            "--seeds is for poor odometry, whose errors are drawn: without it all runs would be one and the same. "
-            "Leave it out, or choose --odometry poor."
+            f"{option} is for poor odometry, whose errors are drawn: without it all runs would be one and the same. "
+            f"Leave it out{cure}"
         )
 
 

@@ -52,6 +52,15 @@ def reference_poses(scans: list[Scan]) -> tuple[Array, bool]:
     return reference, len(odometry) == len(scans) and np.array_equal(np.array(odometry), reference)
 
 
+def has_reference(scans: list[Scan]) -> bool:
+    """Whether `reference_poses` of these scans are known."""
+    try:
+        reference_poses(scans)
+    except EvaluationError:
+        return False
+    return True
+
+
 def name_of_reference(scans: list[Scan]) -> str:
     """What `reference_poses` of these scans are, or why there are none."""
     try:

@@ -92,7 +92,8 @@ def prepared(scans: list[Scan], odometry: str, seed: int) -> tuple[list[Scan], A
             "The log's odometry is all the reference there is: choose poor odometry, or none."
         )
     if odometry == "recorded" and all(scan.odometry is None for scan in scans):
-        raise EvaluationError("The recording has no odometry: choose auto, none, or poor.")
+        others = "auto or none" if reference is None else "auto, none, or poor"
+        raise EvaluationError(f"The recording has no odometry: choose {others}.")
     if reference is not None and is_drawn(scans, odometry):
         return with_poor_odometry(scans, reference, seed), reference
     return ([replace(scan, odometry=None) for scan in scans] if odometry == "none" else scans), reference
