@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Callable
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from zipfile import ZipFile
@@ -12,7 +13,7 @@ import psutil
 import pytest
 from lidarcore_app.jobs.map_making import Making
 from lidarcore_app.pipeline.settings import Settings
-from serving import Json, Server, assert_problem, wait_until
+from serving import Json, Server, assert_problem, wait_until, write_room
 from two_lidars import write_two_lidars
 
 from lidarcore.geometry import pose_difference, relative
@@ -45,6 +46,10 @@ def making(server: Server) -> Json:
 def ended(server: Server) -> Json:
     wait_until(lambda: making(server)["state"] != "running", "it has ended", LONGEST)
     return making(server)
+
+
+def has_ended(server: Server, id: int) -> bool:
+    return id in [one["id"] for one in server.get(MAKING)["ended"]]
 
 
 def makers(server: Server) -> list[psutil.Process]:
@@ -249,7 +254,23 @@ def test_what_cannot_be_mapped_is_refused_with_the_reason(server: Server) -> Non
     body = {"recording": "two.mcap", "topic": problem["topics"][0]}
     assert server.change("POST", MAKING, body)["total"] is None
     assert ended(server)["recording"] == "two.mcap"
-    server.change("POST", MAKING, body | {"topic": "/none"})
-    made = ended(server)
-    assert (made["state"], made["session"]) == ("failed", None)
-    assert "has no lidar '/none': choose /front or /rear" in made["error"]
+    refused = assert_problem(server.http.post(MAKING, json=body | {"topic": "/none"}), 409)
+    assert "has no lidar '/none': choose /front or /rear" in refused["detail"]
+    assert refused["topics"] == ["/front", "/rear"]
+    assert_problem(server.http.post(MAKING, json=body | {"topic": ""}), 409)
+    write_room(server.folder / "room.npz", scans=2)
+    refused = assert_problem(server.http.post(MAKING, json={"recording": "room.npz", "topic": "/scan"}), 409)
+    assert "names none, leave it out" in refused["detail"]
+    assert [one["recording"] for one in server.get(MAKING)["ended"]] == ["two.mcap"]
+
+
+def test_the_only_lidar_of_a_recording_is_the_same_one_whether_it_is_named_or_not(server: Server) -> None:
+    drive(server.folder / "drive.mcap", 60)
+    (topic,) = server.get("/recordings/drive.mcap/facts")["topics"]
+    for first, others in ((None, ("", topic)), (topic, (None, ""))):
+        begun = server.change("POST", MAKING, {"recording": "drive.mcap", "topic": first})
+        for other in others:
+            again = server.http.post(MAKING, json={"recording": "drive.mcap", "topic": other})
+            assert "drive.mcap is being made" in assert_problem(again, 409)["detail"]
+        assert server.http.delete(MAKING, params={"id": begun["id"]}).is_success
+        wait_until(partial(has_ended, server, begun["id"]), "it has ended")

@@ -10,6 +10,7 @@ from typing_extensions import TypedDict
 from lidarcore import RecordingError, TopicError
 
 from ...jobs.map_making import MakingStatus
+from ...sources.recording_facts import RecordingFacts
 from ..problems import documented
 from ..schemas import StrictBody
 from .dependencies import Server
@@ -33,7 +34,7 @@ ZIP: dict[int | str, dict[str, Any]] = {200: {"description": "The files", "conte
 
 
 class WantedMap(StrictBody):
-    """A recording of the folder, and which lidar if it has several."""
+    """A recording of the folder, and which lidar if it has several; the only one need not be named."""
 
     recording: Annotated[str, Field(max_length=200)]
     topic: Annotated[str | None, Field(max_length=200)] = None
@@ -52,9 +53,26 @@ def start(
     """
     path = server.library.path(wanted.recording)
     facts = server.library.facts(wanted.recording)
-    if facts.problem and wanted.topic is None:
-        raise TopicError(facts.problem, facts.topics) if facts.topics else RecordingError(facts.problem)
-    return server.map_maker.start(path, wanted.topic, facts.scans, server.runtime.settings)
+    topic = _lidar(path.name, facts, wanted.topic)
+    return server.map_maker.start(path, topic, facts.scans, server.runtime.settings)
+
+
+def _lidar(recording: str, facts: RecordingFacts, wanted: str | None) -> str | None:
+    """The name of the lidar that is wanted, or of the only one; None where the format names none.
+
+    Raises TopicError if it is not there or has to be chosen, RecordingError if the recording cannot be read.
+    """
+    are_several = len(facts.topics) > 1
+    if facts.problem and not are_several:
+        raise RecordingError(facts.problem)
+    if not wanted and are_several:
+        raise TopicError(str(facts.problem), facts.topics)
+    if wanted and wanted not in facts.topics:
+        listed = (
+            f"choose {' or '.join(facts.topics)}" if facts.topics else "its format names none, leave it out"
+        )
+        raise TopicError(f"{recording} has no lidar {wanted!r}: {listed}.", facts.topics)
+    return wanted or next(iter(facts.topics), None)
 
 
 @router.get("", response_description="What is made, or was made last, and what waits")
