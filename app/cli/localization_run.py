@@ -72,8 +72,11 @@ def tracker_in(path: Path | None, settings: Settings) -> Navigator | WholeScans:
         )
     if is_grid:
         return WholeScans(settings.extraction, known=MapPicture(read_ros_map(path)), background=False)
-    with path.open(encoding="utf-8-sig", newline="") as file:
-        known = from_stored(read_landmarks(file, format))
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            known = from_stored(read_landmarks(file, format))
+    except MapFileError as error:
+        raise MapFileError(f"{path.name}: {error}") from error
     return Navigator(replace(settings.navigation, mode="localize"), known)
 
 

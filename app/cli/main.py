@@ -133,14 +133,17 @@ def _message(error: Exception) -> str | None:
     from pydantic import ValidationError
 
     from lidarcore import LidarError
+    from lidarcore.files import reason
 
     from ..errors import explained
 
     if isinstance(error, ValidationError):
         return explained(error)
     if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}"
-    if isinstance(error, LidarError | OSError | json.JSONDecodeError):
+        return f"{error.filename}: {reason(error)}"
+    if isinstance(error, OSError):
+        return reason(error)
+    if isinstance(error, LidarError | json.JSONDecodeError):
         return str(error)
     return None
 

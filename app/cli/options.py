@@ -153,6 +153,7 @@ def settings_from(file: Path | None, assignments: list[str] | None) -> "Settings
 
 def _read_settings(file: Path) -> dict[str, Any]:
     from lidarcore import SENSORS, LidarError
+    from lidarcore.files import reason
 
     try:
         settings = json.loads(file.read_text("utf-8"))
@@ -162,7 +163,7 @@ def _read_settings(file: Path) -> dict[str, Any]:
             f"There is no file {file}, and no sensor of that name; known are {sensors}."
         ) from error
     except ValueError as error:  # not text, or not JSON
-        raise LidarError(f"{file} is not a JSON file: {error}.") from error
+        raise LidarError(f"{file} is not a JSON file: {reason(error)}.") from error
     if not isinstance(settings, dict):
         raise LidarError(f"{file} should hold an object, as GET /api/v1/settings gives it.")
     return settings

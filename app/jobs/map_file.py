@@ -10,6 +10,7 @@ from typing import NamedTuple
 from zipfile import BadZipFile, ZipFile
 
 from lidarcore.errors import MapFileError
+from lidarcore.files import reason
 from lidarcore.landmarks import Landmark, read_landmarks
 from lidarcore.mapping.export import COVARIANCE_FILE, read_walls
 from lidarcore.mapping.grid import OccupancyGrid, read_ros_map
@@ -78,7 +79,7 @@ def _unpacked(path: Path, folder: Path) -> Path:
                 )
             return [Path(archive.extract(part, folder)) for part in (*parts, *yamls)][-1]
     except (BadZipFile, NotImplementedError, RuntimeError, OSError) as error:
-        raise MapFileError(f"This zip cannot be read: {error}.") from error
+        raise MapFileError(f"This zip cannot be read: {reason(error)}.") from error
 
 
 def _is_read(part: Path) -> bool:

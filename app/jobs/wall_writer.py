@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.errors import MapFileError, UnknownSessionError
+from lidarcore.files import reason
 from lidarcore.landmarks import StoredGrid, StoredWall
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import JointWalls, WallTable, pack_covariance
@@ -102,5 +103,5 @@ def grid_from_stored(stored: StoredGrid) -> OccupancyGrid:
         cells = zlib.decompressobj().decompress(stored.cells, count + 1)
         table = np.frombuffer(cells, np.int8).reshape(stored.rows, stored.columns)
     except (zlib.error, ValueError) as error:
-        raise MapFileError(f"The grid of this map is damaged: {error}.") from error
+        raise MapFileError(f"The grid of this map is damaged: {reason(error)}.") from error
     return OccupancyGrid(table, stored.resolution, np.array([stored.x, stored.y, stored.heading]))

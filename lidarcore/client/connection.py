@@ -7,6 +7,7 @@ from typing import Any
 import httpx
 
 from lidarcore.errors import ClientError, ServerUnreachableError
+from lidarcore.files import reason
 
 
 class Connection:
@@ -67,7 +68,7 @@ class Connection:
 
     def _unreachable(self, error: Exception) -> ServerUnreachableError:
         return ServerUnreachableError(
-            f"No server answers at {self._url} ({error}): start `lidarcore serve`, or give the URL it printed."
+            f"No server answers at {self._url} ({reason(error)}): start `lidarcore serve`, or give the URL it printed."
         )
 
 

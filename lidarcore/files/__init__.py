@@ -6,6 +6,10 @@ from contextlib import ExitStack, contextmanager
 from itertools import count
 from pathlib import Path
 
+from lidarcore.files.reasons import reason
+
+__all__ = ["partials", "reason", "replacing", "replacing_all", "write"]
+
 _NUMBERS = count()
 
 

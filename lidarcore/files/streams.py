@@ -4,19 +4,13 @@ import bz2
 import gzip
 import io
 import struct
-import sys
-import zlib
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, Protocol
 
 from lidarcore.errors import RecordingError
-
-if sys.version_info >= (3, 14):
-    from compression import zstd
-else:
-    from backports import zstd
+from lidarcore.files.reasons import UNPACKING, zstd
 
 HEAD = 1 << 16
 """Bytes a format may look at to recognise itself."""
@@ -26,7 +20,7 @@ MAX_LINE = MEBIBYTE
 MAX_RECORD = 32 * MEBIBYTE
 MAX_CONTENT = 256 * MEBIBYTE
 
-DAMAGE = (EOFError, KeyError, ValueError, OSError, RuntimeError, struct.error, zstd.ZstdError)
+DAMAGE = (EOFError, KeyError, ValueError, OSError, RuntimeError, struct.error, *UNPACKING)
 """What broken records lead to: cut short, a field missing, a length too long, or not to be unpacked."""
 
 GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
@@ -70,8 +64,8 @@ class _Unpacked(io.RawIOBase):
     def readinto(self, buffer: bytearray | memoryview) -> int:  # type: ignore[override]
         try:
             piece = self._packed.read1(len(buffer))
-        except (EOFError, OSError, zlib.error, zstd.ZstdError) as error:
-            self._remark(f"The packed file is damaged or cut short ({error}): everything before is read.")
+        except (EOFError, OSError, *UNPACKING):
+            self._remark("The packed file is damaged or cut short: everything before is read.")
             return 0
         self._left -= len(piece)
         if self._left < 0:
@@ -98,9 +92,9 @@ def open_stream(path: Path, remark: Callable[[str], None]) -> io.BufferedReader:
     return io.BufferedReader(_Unpacked(path, packed, remark), MEBIBYTE)
 
 
-def read_head(path: Path) -> bytes:
-    """Read the first bytes of the file's content, unpacked."""
-    with open_stream(path, lambda _: None) as stream:
+def read_head(path: Path, remark: Callable[[str], None] = lambda _: None) -> bytes:
+    """Read the first bytes of the file's content, unpacked; damage of the packing goes to `remark`."""
+    with open_stream(path, remark) as stream:
         return stream.read(HEAD)
 
 

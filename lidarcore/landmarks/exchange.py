@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from lidarcore.errors import LandmarkError, MapFileError
-from lidarcore.files import replacing
+from lidarcore.files import reason, replacing
 from lidarcore.files.json_reader import JsonReader
 from lidarcore.files.streams import MAX_LINE
 from lidarcore.files.texts import json_lines
@@ -223,4 +223,4 @@ def _explained(what: str) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, csv.Error, RecursionError) as error:
-        raise MapFileError(f"{what} cannot be read or written: {error}.") from error
+        raise MapFileError(f"{what} cannot be read or written: {reason(error)}.") from error

@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image
 
 from lidarcore.errors import MapFileError
-from lidarcore.files import replacing, write
+from lidarcore.files import reason, replacing, write
 from lidarcore.landmarks.landmark_map import LandmarkMap
 
 _UNKNOWN, _OCCUPIED = 205, 0  # grey values as ROS map_server writes them
@@ -44,7 +44,7 @@ def export_picture(
             Image.fromarray(grey).save(partial, "PNG")
         write(path.with_suffix(".yaml"), _yaml(path.name, resolution, origin.tolist()))
     except OSError as error:
-        raise MapFileError(f"{path} cannot be written: {error}.") from error
+        raise MapFileError(f"{path} cannot be written: {reason(error)}.") from error
 
 
 def _yaml(image: str, resolution: float, origin: list[float]) -> str:

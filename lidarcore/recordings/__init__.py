@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lidarcore.body_mask import Sector
 from lidarcore.errors import RecordingError
+from lidarcore.files import reason
 from lidarcore.files.streams import read_head
 from lidarcore.recordings.base import Recording
 from lidarcore.recordings.writer import ELLIPSE_SCALE, RecordingWriter
@@ -72,7 +73,7 @@ def open_recording(
         head = _head(path)
         recognised = [format_ for format_ in FORMATS if format_.recognises(path, head)]
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
-        raise RecordingError(f"{path} cannot be opened: {error}.") from error
+        raise RecordingError(f"{path} cannot be opened: {reason(error)}.") from error
     if recognised:
         recording = recognised[0](path, topic)
         if mask is not None:
@@ -107,7 +108,10 @@ def _head(path: Path) -> bytes:
         raise RecordingError(
             f"There is no file at {path} but a device or a pipe: save the recording, and give its path."
         )
-    head = read_head(path)
+    damage: list[str] = []
+    head = read_head(path, damage.append)
+    if not head and damage:
+        raise RecordingError(f"{path.name} is damaged: nothing of it can be unpacked. Copy it anew.")
     if not head:
         raise RecordingError(f"{path.name} is empty.")
     return head

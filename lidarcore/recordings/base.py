@@ -11,6 +11,7 @@ from typing import ClassVar
 
 from lidarcore.body_mask import Sector, masked
 from lidarcore.errors import LidarError, RecordingError, ScanError, TopicError
+from lidarcore.files import reason
 from lidarcore.files.streams import MEBIBYTE, available, open_stream, whole
 from lidarcore.scan import Array, Scan
 
@@ -163,8 +164,7 @@ class Recording(ABC):
         except LidarError:
             raise
         except Exception as error:
-            reason = f"{type(error).__name__}: {error}".rstrip(": ")
-            raise self._error(f"cannot be read as {self.name} ({reason}).") from error
+            raise self._error(f"cannot be read as {self.name}: {reason(error)}.") from error
 
 
 def _counted(what: str, number: int) -> str:

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import EvaluationError
+from lidarcore.files.reasons import UNPACKING, reason
 from lidarcore.geometry import PoseTrack, compose, relative
 from lidarcore.scan import Scan
 
@@ -106,9 +107,9 @@ def read_relations(path: Path) -> Relations:
         with opened(path, "rt") as file, warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of an empty file, which is refused below
             table = np.loadtxt(file, ndmin=2)
-    except ValueError as error:
-        reason = str(error).rstrip(".")
-        raise EvaluationError(f"{path.name} is not a file of relations: {reason}.") from error
+    except (ValueError, EOFError, gzip.BadGzipFile, *UNPACKING) as error:
+        why = reason(error).rstrip(".")
+        raise EvaluationError(f"{path.name} is not a file of relations: {why}.") from error
     if table.shape[1] != 8 or not np.isfinite(table).all():
         raise EvaluationError(
             f"{path.name} should have eight numbers in each row: t1 t2 dx dy dz roll pitch yaw."

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
-from lidarcore.files import replacing_all
+from lidarcore.files import reason, replacing_all
 from lidarcore.mapping.export.drawings import corner_places, map_png, plan_dxf, plan_svg
 from lidarcore.mapping.export.tables import read_walls_csv, walls_csv, walls_geojson
 from lidarcore.mapping.grid import OccupancyGrid
@@ -40,7 +40,9 @@ def read_walls(folder: str | Path) -> WallTable:
     try:
         return unpack_covariance(path.read_bytes(), walls)
     except (OSError, MapFileError) as error:
-        raise MapFileError(f"{path.name}: {error} Without this file the walls can be read.") from error
+        raise MapFileError(
+            f"{path.name}: {reason(error)} Without this file the walls can be read."
+        ) from error
 
 
 def write_map(
@@ -77,4 +79,4 @@ def write_map(
     except OSError as error:
         if made and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
-        raise MapFileError(f"The map cannot be written to {folder}: {error}.") from error
+        raise MapFileError(f"The map cannot be written to {folder}: {reason(error)}.") from error

@@ -9,6 +9,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MapFileError
+from lidarcore.files import reason
 from lidarcore.files.texts import csv_text, json_lines
 from lidarcore.mapping.walls import Walls, WallTable
 
@@ -37,7 +38,7 @@ def read_walls_csv(path: str | Path) -> WallTable:
         with Path(path).open(encoding="utf-8-sig", newline="") as file:
             return _table(_numbers(csv.DictReader(file, strict=True)))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise MapFileError(f"{name} cannot be read: {error}.") from error
+        raise MapFileError(f"{name} cannot be read: {reason(error)}.") from error
     except MapFileError as error:
         raise MapFileError(f"{name}: {error}") from error
 

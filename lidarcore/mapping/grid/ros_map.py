@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 from pydantic import BaseModel, Field, ValidationError, model_validator
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.errors import GridError, MapFileError
-from lidarcore.files import replacing_all
+from lidarcore.files import reason, replacing_all
 from lidarcore.mapping.grid.occupancy import FREE, OCCUPIED, UNKNOWN, Cells, OccupancyGrid
 
 _BLACK, _GREY, _WHITE = 0, 205, 254  # what map_saver writes for occupied, unknown and free cells
@@ -62,7 +62,7 @@ def read_ros_map(path: str | Path) -> OccupancyGrid:
         cells = _read_image(_image_beside(path, header.image), header)
         return OccupancyGrid(cells[::-1], header.resolution, np.array(header.origin))
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise MapFileError(f"{path.name} cannot be read: {error}") from error
+        raise MapFileError(f"{path.name} cannot be read: {reason(error)}.") from error
 
 
 def write_ros_map(grid: OccupancyGrid, path: str | Path) -> None:
@@ -79,7 +79,7 @@ def write_ros_map(grid: OccupancyGrid, path: str | Path) -> None:
             image_part.write_bytes(ros_pgm(grid))
             yaml_part.write_text(ros_yaml(grid, image.name), "utf-8")
     except OSError as error:
-        raise MapFileError(f"{path} cannot be written: {error}.") from error
+        raise MapFileError(f"{path} cannot be written: {reason(error)}.") from error
 
 
 def ros_pgm(grid: OccupancyGrid) -> bytes:
@@ -117,7 +117,14 @@ def _read_header(path: Path) -> _Header:
         wrong = "; ".join(f"{'.'.join(map(str, e['loc'])) or 'header'}: {e['msg']}" for e in error.errors())
         raise MapFileError(f"{path.name} cannot be used as a map: {wrong}.") from error
     except (YAMLError, RecursionError) as error:
-        raise MapFileError(f"{path.name} is not YAML: {error}") from error
+        raise MapFileError(
+            f"{path.name} is no valid YAML{_where(error)}: mend it, or save the map anew."
+        ) from error
+
+
+def _where(error: Exception) -> str:
+    mark = error.problem_mark if isinstance(error, MarkedYAMLError) else None
+    return f" (line {mark.line + 1})" if mark else ""
 
 
 def _image_beside(path: Path, name: str) -> Path:
@@ -127,6 +134,8 @@ def _image_beside(path: Path, name: str) -> Path:
         raise MapFileError(
             f"{path.name} points to {name}, outside of its folder: put the image beside it and name it alone."
         )
+    if not image.exists():
+        raise MapFileError(f"{path.name} names the image {name}, which is not there: put it beside it.")
     return image
 
 
@@ -151,6 +160,8 @@ def _read_image(path: Path, header: _Header) -> Cells:
             return cells
     except UnidentifiedImageError as error:
         raise MapFileError(f"{path.name} is not a PGM, PNG or BMP image.") from error
+    except (OSError, SyntaxError) as error:  # the latter of a damaged PNG
+        raise MapFileError(f"{path.name} cannot be read: {reason(error)}.") from error
 
 
 def _codes(image: Image.Image, is_deep: bool) -> Ints:

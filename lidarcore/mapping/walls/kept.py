@@ -8,6 +8,7 @@ import zlib
 import numpy as np
 
 from lidarcore.errors import MapFileError
+from lidarcore.files import reason
 from lidarcore.mapping.grid.occupancy import Mask
 from lidarcore.mapping.walls.joint import NUMBERS, JointWalls, Singles, joint_walls
 from lidarcore.mapping.walls.table import WallTable
@@ -32,7 +33,7 @@ def unpack_covariance(packed: bytes, walls: WallTable) -> JointWalls:
     try:
         return joint_walls(walls, _checked(_unpacked(packed, walls)))
     except (ValueError, zlib.error) as error:
-        raise MapFileError(f"How the walls of this map err together is damaged: {error}.") from error
+        raise MapFileError(f"How the walls of this map err together is damaged: {reason(error)}.") from error
 
 
 def _unpacked(packed: bytes, walls: WallTable) -> Singles:

@@ -47,8 +47,8 @@ class McapReader:
                     yield from self._chunk(data)
                 elif message := self._record(opcode, data):
                     yield message
-        except DAMAGE as error:
-            self._remark(f"The MCAP file is damaged or cut short ({error}): everything before is read.")
+        except DAMAGE:
+            self._remark("The MCAP file is damaged or cut short: everything before is read.")
 
     def _chunk(self, data: bytes) -> Iterator[Message]:
         try:

@@ -58,8 +58,8 @@ class Rosbag1(RosRecording):
                     yield from self._chunk(header, data, unpacker)
                 else:
                     yield header, data
-        except DAMAGE as error:
-            self._remark(f"The bag is damaged or cut short ({error}): everything before is read.")
+        except DAMAGE:
+            self._remark("The bag is damaged or cut short: everything before is read.")
 
     def _chunk(self, header: Header, data: bytes, unpacker: Unpacker) -> Iterator[tuple[Header, bytes]]:
         try:

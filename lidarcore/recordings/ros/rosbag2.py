@@ -84,8 +84,8 @@ class Rosbag2(RosRecording):
                         self._count("damaged rows left out", 1)
                     else:
                         yield Message(*topics[topic], "cdr", time * 1e-9, data)
-            except sqlite3.DatabaseError as error:
-                self._remark(f"The database is damaged or cut short ({error}): everything before is read.")
+            except sqlite3.DatabaseError:
+                self._remark("The database is damaged or cut short: everything before is read.")
 
     def _database(self, file: Path) -> sqlite3.Connection:
         """Open read-only, without locks or side files; a packed database is unpacked into a temporary file."""

@@ -183,7 +183,9 @@ def _opening_error(path: str, baud: int, error: Exception) -> DeviceError:
             return _busy(path, holders(path))
         case number if isinstance(error, ValueError) and number != errno.EIO:
             return DeviceError(f"{path} cannot be set to {baud} baud: the RPLIDAR S1 talks at 256000.")
-    return NoDeviceError(f"{path} cannot be used as a serial port ({error}): {ports_there_are()}")
+        case number:
+            why = f" ({os.strerror(number)})" if number else ""
+            return NoDeviceError(f"{path} cannot be used as a serial port{why}: {ports_there_are()}")
 
 
 def ports_there_are(list_ports: ListPorts = comports) -> str:

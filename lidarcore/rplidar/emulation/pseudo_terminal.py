@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from lidarcore.errors import DeviceError
+from lidarcore.files import reason
 
 _TCGETS2 = 0x802C542A  # Linux: the speed as a number, also where it is none of the standard ones
 _TERMIOS2 = struct.Struct("4I20x2I")
@@ -55,7 +56,9 @@ class PseudoTerminal:
             # Our end of the other side stays open: without it, nobody there would be an error.
             tty.setraw(ends[1])
         except (ImportError, OSError) as error:
-            raise DeviceError(f"This system offers no pseudo-terminal for the emulator: {error}.") from error
+            raise DeviceError(
+                f"This system offers no pseudo-terminal for the emulator: {reason(error)}."
+            ) from error
         os.set_blocking(ends[0], False)
         self._ends = ends
         try:
