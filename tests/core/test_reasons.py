@@ -12,11 +12,16 @@ from PIL import Image
 from lidarcore import Client, LidarError, open_recording
 from lidarcore.evaluation.maps.accuracy import read_relations
 from lidarcore.landmarks import read_landmarks
-from lidarcore.mapping.export import read_walls
+from lidarcore.mapping.export import read_walls, write_map
 from lidarcore.mapping.grid import OccupancyGrid, read_ros_map, write_ros_map
+from lidarcore.mapping.walls import WallTable
 from lidarcore.rplidar.connection.port import Port
 
 INSIDES = re.compile(r"Errno|Error|zlib|gzip|codec|unicode|zip file|CRC|None|b'|ioctl|stream|\n")
+GRID = OccupancyGrid(np.zeros((2, 2), np.int8), 0.05, np.zeros(3))
+NO_WALLS = WallTable(
+    *(np.empty(shape) for shape in (0, 0, 0, (0, 2, 2), (0, 2, 2), (0, 2), (0, 2), 0, 0, 0, 0, 0))
+)
 RELATIONS = b"1 2 0.1 0.2 0 0 0 0.3\n" * 500
 YAML = "image: map.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
 
@@ -94,11 +99,17 @@ def of_text_in_latin_1(folder: Path) -> object:
             "map.yaml names the image map.pgm, which is not there: put it beside it.",
         ),
         (of_half_a_picture, "map.png cannot be read: it is damaged or cut short, copy it anew."),
-        (lambda folder: read_ros_map(folder), "cannot be read: Is a directory."),
+        (lambda folder: read_ros_map(folder), "is a folder: give the YAML file in it, such as /"),
         (
-            lambda folder: write_ros_map(
-                OccupancyGrid(np.zeros((2, 2), np.int8), 0.05, np.zeros(3)), folder / "none" / "map.yaml"
-            ),
+            lambda folder: read_walls(written(folder / "walls.csv", "id\n")),
+            "walls.csv is a file: give the folder of the map, such as /",
+        ),
+        (
+            lambda folder: write_map(written(folder / "hall", ""), GRID, NO_WALLS),
+            "hall is a file: give the folder of the map, such as /",
+        ),
+        (
+            lambda folder: write_ros_map(GRID, folder / "none" / "map.yaml"),
             "map.yaml cannot be written: No such file or directory.",
         ),
         (lambda folder: read_walls(folder), "walls.csv cannot be read: No such file or directory."),

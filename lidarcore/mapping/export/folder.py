@@ -32,8 +32,9 @@ COVARIANCE_FILE = "walls_covariance.bin"
 def read_walls(folder: str | Path) -> WallTable:
     """The walls of a folder of a map, which can be measured if COVARIANCE_FILE is there.
 
-    Raises MapFileError, which names what is wrong, if walls.csv or that file cannot be read.
+    Raises MapFileError, which names what is wrong, if it is no folder, or walls.csv or that file cannot be read.
     """
+    _check_no_file(Path(folder))
     walls, path = read_walls_csv(Path(folder) / "walls.csv"), Path(folder) / COVARIANCE_FILE
     if not path.is_file():
         return walls
@@ -59,8 +60,9 @@ def write_map(
     path   (T, 2) or (T, 3) m: where the sensor was, for the pictures
     texts  further text files by name, such as poses.csv
 
-    Raises MapFileError if a file cannot be written; the folder is as it was then.
+    Raises MapFileError if it is no folder, or a file cannot be written; the folder is as it was then.
     """
+    _check_no_file(Path(folder))
     folder, packed = Path(folder), pack_covariance(walls) if isinstance(walls, JointWalls) else None
     others = {name: text.encode() for name, text in (texts or {}).items()}
     others |= {} if packed is None else {COVARIANCE_FILE: packed}
@@ -80,3 +82,8 @@ def write_map(
         if made and folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
         raise MapFileError(f"The map cannot be written to {folder}: {reason(error)}.") from error
+
+
+def _check_no_file(path: Path) -> None:
+    if path.is_file():
+        raise MapFileError(f"{path} is a file: give the folder of the map, such as {path.parent}.")

@@ -53,10 +53,12 @@ def read_ros_map(path: str | Path) -> OccupancyGrid:
 
     With one exception: Nav2 before 2025 wrote unknown cells as grey 205 and a free_thresh of 0.25, by which it reads
     them as free. A trinary image of only the three shades that map_saver writes is read as it was meant.
-    Raises MapFileError if a file is missing, is none, is damaged or too large, says what makes no sense, or if the
-    YAML points to an image outside of its folder.
+    Raises MapFileError if a file is missing, is none, is a folder, is damaged or too large, says what makes no sense,
+    or if the YAML points to an image outside of its folder.
     """
     path = Path(path)
+    if path.is_dir():
+        raise MapFileError(f"{path} is a folder: give the YAML file in it, such as {path / 'map.yaml'}.")
     try:
         header = _read_header(path)
         cells = _read_image(_image_beside(path, header.image), header)
