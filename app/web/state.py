@@ -68,9 +68,9 @@ class State:
         self.recorder = AsyncRecorder()
         self.taps = Taps(scan=self._record, bytes=self.recorder.tap)
         first = _first_source(options, self.taps)
-        self.viser = ViserMount()
         self._ending = ExitStack()
         self.landmarks = _landmark_store(options, self._ending)
+        self.viser = ViserMount()  # after what may be refused: it prints that it has stopped
         folder = options.recordings.parent
         setups = SensorSetups(SensorMemory(folder / SENSORS))
         self._scene = Scene(self.viser.server)

@@ -12,6 +12,7 @@ from pathlib import Path
 from threading import Lock
 
 from lidarcore.errors import LandmarkError, LandmarkMapError
+from lidarcore.files import reason
 from lidarcore.files.foreign_database import MOST_BYTES
 from lidarcore.landmarks.schema import APPLICATION, UNIT, VERSION, expected_schema, migrate, schema_of
 
@@ -116,7 +117,7 @@ class Database:
         try:
             yield
         except (sqlite3.Error, UnicodeDecodeError) as error:  # the latter by a damaged byte of a text
-            raise LandmarkMapError(f"The landmark map {self.path} cannot be used: {error}.") from error
+            raise LandmarkMapError(f"The landmark map {self.path} cannot be used: {_why(error)}.") from error
         except OverflowError as error:
             raise LandmarkError("A number has more than 64 bits: no id is so large.") from error
 
@@ -126,9 +127,28 @@ def path_of(url: str | Path) -> Path:
     text = str(url)
     if text.startswith("sqlite:///"):
         text = text.removeprefix("sqlite:///")
-    if "://" in text or text in ("", ":memory:"):
+    if not text.strip():
+        raise LandmarkMapError("The name of the landmark map is empty: give a path, or sqlite:///path.")
+    if "://" in text or text == ":memory:":
         raise LandmarkMapError(f"{url} cannot be the file of a landmark map: give a path, or sqlite:///path.")
     path = Path(text)
-    if "\0" in text or not path.parent.is_dir() or path.is_dir():
+    if path.is_dir():
+        raise LandmarkMapError(f"{path} is a folder: give a file in it, such as {path / 'landmarks.db'}.")
+    if "\0" in text or not path.parent.is_dir():
         raise LandmarkMapError(f"{path} cannot be a landmark map: give a file in a folder that exists.")
     return path
+
+
+_WHY = {
+    sqlite3.SQLITE_NOTADB: "it is no database, or damaged; give another file, or a copy that is whole",
+    sqlite3.SQLITE_CORRUPT: "it is damaged; give another file, or a copy that is whole",
+    sqlite3.SQLITE_BUSY: "it is locked by another program; end that one, or give another file",
+    sqlite3.SQLITE_READONLY: "it may not be written; change its permissions, or give another file",
+    sqlite3.SQLITE_CANTOPEN: "it cannot be opened; change its permissions, or give another file",
+    sqlite3.SQLITE_FULL: "the disk is full; free some space",
+}
+
+
+def _why(error: Exception) -> str:
+    """What SQLite says of a file that its user can mend, in plain words; else as it says it."""
+    return _WHY.get(getattr(error, "sqlite_errorcode", 0) & 0xFF, reason(error))

@@ -77,6 +77,26 @@ def test_what_cannot_be_played_is_one_sentence(arguments: list[str], words: list
     assert_refused(run("serve", "--http-port", 0, *arguments), *words)
 
 
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (
+            b"not a database at all" * 100,
+            "broken.db cannot be used: it is no database, or damaged; give another file",
+        ),
+        (None, "The name of the landmark map is empty: give a path"),
+    ],
+)
+def test_what_cannot_be_the_file_of_maps_is_one_sentence(
+    content: bytes | None, words: str, tmp_path: Path, background: Path
+) -> None:
+    """Without a word of what had begun and ends for it."""
+    broken = tmp_path / "broken.db"
+    broken.write_bytes(content or b"")
+    refused = run("serve", background, "--http-port", 0, "--map", broken if content else "")
+    assert_refused(refused, words)
+
+
 @pytest.mark.long
 def test_a_busy_sensor_is_one_sentence(sensor: EmulatorProcess) -> None:
     with Serial(sensor.port, exclusive=True):

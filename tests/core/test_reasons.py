@@ -2,6 +2,7 @@
 
 import gzip
 import re
+import sqlite3
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from PIL import Image
 
 from lidarcore import Client, LidarError, open_recording
 from lidarcore.evaluation.maps.accuracy import read_relations
-from lidarcore.landmarks import read_landmarks
+from lidarcore.landmarks import Atlas, read_landmarks
 from lidarcore.mapping.export import read_walls, write_map
 from lidarcore.mapping.grid import OccupancyGrid, read_ros_map, write_ros_map
 from lidarcore.mapping.walls import WallTable
@@ -42,6 +43,12 @@ def relations(content: bytes) -> Callable[[Path], object]:
 def written(path: Path, content: bytes | str) -> Path:
     path.write_bytes(content.encode() if isinstance(content, str) else content)
     return path
+
+
+def of_another_database(folder: Path) -> object:
+    with sqlite3.connect(folder / "landmarks.db") as database:
+        database.execute("CREATE TABLE other (id)")
+    return open_recording(folder)
 
 
 def of_damaged_npz(folder: Path) -> object:
@@ -76,6 +83,13 @@ def of_text_in_latin_1(folder: Path) -> object:
         (
             lambda folder: open_recording(folder / ("a" * 300)),
             "cannot be opened: File name too long.",
+        ),
+        (of_another_database, "landmarks.db is an SQLite database, but no ROS 2 bag"),
+        (lambda folder: Atlas(folder), "is a folder: give a file in it, such as /"),
+        (lambda folder: Atlas(" "), "The name of the landmark map is empty: give a path"),
+        (
+            lambda folder: Atlas(written(folder / "a.db", b"no database" * 100)),
+            "a.db cannot be used: it is no database, or damaged; give another file, or a copy that is whole.",
         ),
         (of_damaged_npz, "room.npz cannot be read as NumPy .npz: it is damaged or cut short, copy it anew."),
         (of_half_an_npz, "room.npz cannot be read as NumPy .npz: it is damaged or cut short, copy it anew."),

@@ -69,7 +69,7 @@ class Rosbag2(RosRecording):
         """Yield the messages in the order of recording, up to the first damaged page."""
         with closing(self._database(file)) as database:
             try:
-                topics = _topics(database)
+                topics = _topics(database, file.name)
                 connections |= {name: type_ for name, type_ in topics.values()}
                 check_topics(len(connections))
                 wanted = [topic for topic, (_, type_) in topics.items() if type_ in WANTED]
@@ -108,14 +108,14 @@ class Rosbag2(RosRecording):
         return plain
 
 
-def _topics(database: sqlite3.Connection) -> dict[int, tuple[str, str]]:
+def _topics(database: sqlite3.Connection, name: str) -> dict[int, tuple[str, str]]:
     """Name and type of each topic id. Raises RecordingError if the tables of a bag are not there.
 
     Views, virtual tables and computed columns in their place could make the database compute for ever.
     """
     if not all(stores_its_columns(database, table) for table in ("topics", "messages")):
         raise RecordingError(
-            "The SQLite database is not a ROS 2 bag: it lacks the tables topics and messages."
+            f"{name} is an SQLite database, but no ROS 2 bag: it lacks the tables topics and messages."
         )
     rows = database.execute("SELECT id, name, type FROM topics ORDER BY id LIMIT ?", (MOST_TOPICS + 1,))
     return {id_: (str(name), plain_type(str(type_))) for id_, name, type_ in rows}
