@@ -72,13 +72,16 @@ def test_segments_and_corners_are_those_of_the_frame_as_json_and_as_csv(server: 
     assert server.get("/segments") == frame["segments"]["ml"]
 
     response = server.http.get("/segments", params={"fitter": "cwlf", "format": "csv"})
+    assert response.headers["content-disposition"] == 'attachment; filename="segments.csv"'
     assert response.headers["content-type"].startswith("text/csv")
     rows = list(csv.DictReader(io.StringIO(response.text)))
     for row, segment in zip(rows, segments, strict=True):
         assert float(row["alpha"]) == segment["alpha"]
         assert [float(row["x_start"]), float(row["y_start"])] == segment["start"]
         assert float(row["cov_alpha_r"]) == segment["covariance"][0][1]
-    rows = list(csv.DictReader(io.StringIO(server.http.get("/corners?fitter=cwlf&format=csv").text)))
+    response = server.http.get("/corners?fitter=cwlf&format=csv")
+    assert response.headers["content-disposition"] == 'attachment; filename="corners.csv"'
+    rows = list(csv.DictReader(io.StringIO(response.text)))
     assert {int(row["id"]): float(row["x"]) for row in rows} == {
         c["id"]: c["by_method"]["cwlf"]["x"] for c in corners
     }

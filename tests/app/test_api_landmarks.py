@@ -313,6 +313,10 @@ def test_a_file_of_a_map_is_named_after_it(maps: Maps, name: str, stem: str | No
     wanted = f"{stem or f'map-{id}'}.csv"
     plain, encoded = f'filename="{wanted}"', f"filename*=utf-8''{quote(wanted)}"
     assert file.headers["content-disposition"] == f"attachment; {plain if wanted.isascii() else encoded}"
+    some = maps.server.http.get("/landmarks", params={"session": id, "format": "csv"}).raise_for_status()
+    named = f"{stem or f'map-{id}'}-landmarks.csv"
+    plain, encoded = f'filename="{named}"', f"filename*=utf-8''{quote(named)}"
+    assert some.headers["content-disposition"] == f"attachment; {plain if named.isascii() else encoded}"
     maps.server.change("PATCH", f"/sessions/{id}", {"name": ""})
 
 

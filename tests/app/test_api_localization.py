@@ -78,7 +78,9 @@ def test_the_trajectory_grows_and_can_be_asked_for_from_a_stamp_on(driving: Serv
     wait_until(
         lambda: driving.get("/trajectory", limit=10_000)["poses"][-1]["stamp"] > max(grown, stamps[-1])
     )
-    table = driving.http.get("/trajectory", params={"format": "csv", "limit": 5}).text.splitlines()
+    answer = driving.http.get("/trajectory", params={"format": "csv", "limit": 5})
+    assert answer.headers["content-disposition"] == 'attachment; filename="trajectory.csv"'
+    table = answer.text.splitlines()
     assert table[0] == "stamp,x,y,heading,sigma_x,sigma_y,sigma_heading,cov_xy,cov_x_heading,cov_y_heading"
     assert len(table) == 6
     now = driving.get("/pose")

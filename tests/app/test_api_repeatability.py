@@ -99,6 +99,7 @@ def test_it_tells_what_the_library_finds_in_the_same_scans(standing: Server) -> 
     assert told["message"] is None
     assert {corner["count"] for method in told["methods"] for corner in method["corners"]} == {30}
     table = standing.http.get("/repeatability", params={"format": "csv"})
+    assert table.headers["content-disposition"] == 'attachment; filename="repeatability.csv"'
     assert table.headers["content-type"].startswith("text/csv")
     assert table.text == to_csv(study.summary())
     with Client(standing.url) as client:

@@ -70,7 +70,9 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
     longest = max(walls, key=lambda wall: wall["length"])
     assert longest["length"] > 3
     assert np.linalg.eigvalsh(longest["covariance"]).min() > 0
-    table = driving.http.get("/walls", params={"format": "csv"}).text.splitlines()
+    answer = driving.http.get("/walls", params={"format": "csv"})
+    assert answer.headers["content-disposition"] == 'attachment; filename="walls.csv"'
+    table = answer.text.splitlines()
     assert table[0].startswith("id,alpha_rad,r_m")
 
     answer = driving.http.get("/walls/nearest", params={"x": 0, "y": 0, "k": 2, "min_length": 2}).json()

@@ -323,7 +323,9 @@ def test_what_a_server_told_of_its_walls_is_there_after_it_was_killed(
         http.patch("/source", json={"state": "paused"}).raise_for_status()
         wait_until(lambda: len(before := confirmed()) >= 4 and told(session=1) == before, seconds=60)
         before = told(session=1)
-        table = http.get("/walls", params={"session": 1, "format": "csv"}).text
+        answer = http.get("/walls", params={"session": 1, "format": "csv"})
+        assert answer.headers["content-disposition"] == 'attachment; filename="map-1-walls.csv"'
+        table = answer.text
     server.process.kill()
     server.process.wait()
 

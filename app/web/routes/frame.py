@@ -12,6 +12,7 @@ from lidarcore.clusters import CLUSTERERS, cluster
 from ...errors import NotFoundError
 from ...pipeline.frame import Frame
 from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns, csv_text, values
+from ..downloads import text_file
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
@@ -47,7 +48,7 @@ def segments(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json"
     """The segments by one method, in the order of the ring. Metres and radians, sensor frame."""
     found = _features(frame, fitter)
     if format == "csv":
-        return _csv(list(range(len(found.segments))), SEGMENT_COLUMNS, found)
+        return _csv("segments", list(range(len(found.segments))), SEGMENT_COLUMNS, found)
     return encode(segments_json(found))
 
 
@@ -62,7 +63,7 @@ def corners(frame: CurrentFrame, fitter: Fitter = None, format: Format = "json")
     found, name = _features(frame, fitter), fitter or next(iter(frame.features))
     if format == "csv":
         ids = {row.index[name]: row.id for row in frame.corners if name in row.index}
-        return _csv([ids[i] for i in range(len(found.corners))], CORNER_COLUMNS, found)
+        return _csv("corners", [ids[i] for i in range(len(found.corners))], CORNER_COLUMNS, found)
     by_it = [row for row in corners_json(frame) if name in row["by_method"]]
     return encode([row | {"by_method": {name: row["by_method"][name]}} for row in by_it])
 
@@ -97,5 +98,5 @@ def _features(frame: Frame, fitter: str | None) -> Features:
     return frame.features[fitter]
 
 
-def _csv(ids: list[int], columns: Columns, features: Features) -> Response:
-    return Response(csv_text({"id": ids, **values(columns, features)}), media_type="text/csv")
+def _csv(stem: str, ids: list[int], columns: Columns, features: Features) -> Response:
+    return text_file(csv_text({"id": ids, **values(columns, features)}), "csv", stem)

@@ -25,7 +25,9 @@ from lidarcore.landmarks import (
 
 from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
-from ..openapi import MEDIA_TYPES, formats
+from ...jobs.map_name import stem_of
+from ..downloads import text_file
+from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from .dependencies import Server
@@ -157,7 +159,8 @@ def find(
     else:
         text = io.StringIO(newline="")
         write_landmarks(page.landmarks, text, format)
-        answer = Response(text.getvalue(), media_type=MEDIA_TYPES[format])
+        stem = stem_of(server.landmarks.atlas, landmark_map.session)
+        answer = text_file(text.getvalue(), format, f"{stem}-landmarks")
     if page.next is not None:
         following = request.url.include_query_params(after=page.next)
         answer.headers["Link"] = f'<{following.path}?{following.query}>; rel="next"'

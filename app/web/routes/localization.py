@@ -22,6 +22,7 @@ from ...pipeline.slam_run import Localization
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
 from ...records import record
+from ..downloads import text_file
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Body as Model
@@ -139,7 +140,7 @@ def trajectory(server: Server, since: Since = None, limit: Limit = 1000, format:
     rows = [row for row in poses if since is None or row.stamp > since][-limit:]
     if format == "csv":
         columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
-        return Response(csv_text(columns), media_type="text/csv")
+        return text_file(csv_text(columns), "csv", "trajectory")
     return encode({"poses": rows})
 
 

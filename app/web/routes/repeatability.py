@@ -15,6 +15,7 @@ from lidarcore.evaluation.repeatability.summary import Summary
 from lidarcore.evaluation.repeatability.tables import to_csv
 
 from ...errors import NotFoundError
+from ..downloads import text_file
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Pair
@@ -65,7 +66,7 @@ def read(
     """
     summary, running = server.repeatability.summary(), server.runtime.settings.repeatability.running
     if format == "csv":
-        return Response(to_csv(summary), media_type="text/csv")
+        return text_file(to_csv(summary), "csv", "repeatability")
     found = {field.name: getattr(summary, field.name) for field in fields(summary)}
     if not running and not summary.scans:
         found["message"] = OFF

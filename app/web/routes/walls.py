@@ -17,9 +17,11 @@ from lidarcore.mapping.walls import WallTable, along, distances, in_box, nearest
 
 from ...errors import NotFoundError
 from ...jobs.landmark_store import LandmarkStore
+from ...jobs.map_name import stem_of
 from ...jobs.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
-from ..openapi import MEDIA_TYPES, formats
+from ..downloads import text_file
+from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from ..wall_json import WallJson, wall_rows
@@ -91,7 +93,7 @@ async def _wanted(
     return which
 
 
-def _asked(
+def _kept(
     server: Server,
     session: Annotated[
         int | None,
@@ -99,8 +101,14 @@ def _asked(
             description="of a map that is kept; if not given of the one that is made, or localized in, now"
         ),
     ] = None,
-) -> WallTable:
-    kept = asked_session(server, session)
+) -> int | None:
+    return asked_session(server, session)
+
+
+Kept = Annotated[int | None, Depends(_kept)]
+
+
+def _asked(server: Server, kept: Kept) -> WallTable:
     return running_walls(server.runtime) if kept is None else server.landmarks.walls(kept)
 
 
@@ -115,6 +123,8 @@ Which = Annotated[Callable[[WallTable], Mask], Depends(_wanted)]
     responses=formats(csv=CSV, geojson={"type": "FeatureCollection"}),
 )
 def walls(
+    server: Server,
+    kept: Kept,
     asked: Asked,
     region: Region,
     which: Which,
@@ -132,7 +142,9 @@ def walls(
     if format == "json":
         return encode({"walls": wall_rows(asked, chosen)})
     text = walls_csv(asked, chosen) if format == "csv" else walls_geojson(asked, chosen)
-    return Response(text, media_type=MEDIA_TYPES[format])
+    return text_file(
+        text, format, "walls" if kept is None else f"{stem_of(server.landmarks.atlas, kept)}-walls"
+    )
 
 
 @router.get(
