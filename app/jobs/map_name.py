@@ -7,6 +7,8 @@ from contextlib import suppress
 from lidarcore.errors import UnknownSessionError
 from lidarcore.landmarks import Atlas, Session
 
+# Windows takes no files of these names, whatever their ending.
+_DEVICE = re.compile(r"con|prn|aux|nul|(com|lpt)[0-9¹²³]", re.IGNORECASE)
 LONGEST = 50  # characters: with an ending no more than the 255 bytes that file systems take, in any script
 
 
@@ -16,9 +18,13 @@ def called(session: Session) -> str:
 
 
 def stem_of(atlas: Atlas, session: int) -> str:
-    """The name of a session as that of a file, without an ending; "map-3" if it has none, or is gone."""
+    """The name of a session as that of a file, without an ending; "map-3" if it has none, or is gone.
+
+    A name that Windows keeps for a device, CON, becomes "map-CON".
+    """
     with suppress(UnknownSessionError):
-        return _plain(atlas.session(session).name) or _numbered(session)
+        plain = _plain(atlas.session(session).name)
+        return f"map-{plain}" if _DEVICE.fullmatch(plain) else plain or _numbered(session)
     return _numbered(session)
 
 

@@ -304,6 +304,12 @@ def test_a_session_is_named_renamed_and_nameless_again(maps: Maps) -> None:
         ("दीवार २", "दीवार-२"),
         ("廊" * 200, "廊" * 50),
         ("../..", None),
+        ("CON", "map-CON"),
+        ("nul.", "map-nul"),
+        ("Com¹", "map-Com¹"),
+        ("lpt9", "map-lpt9"),
+        ("Hall.", "Hall"),
+        ("Console", "Console"),
     ],
 )
 def test_a_file_of_a_map_is_named_after_it(maps: Maps, name: str, stem: str | None) -> None:
