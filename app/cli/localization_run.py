@@ -93,6 +93,8 @@ def write_map(path: Path, landmarks: Landmarks, method: str) -> None:
 
 def format_of(path: Path, others: Sequence[str] = ()) -> str:
     """The format of a file of landmarks by its suffix; `others` would do as well. Raises RecordingError."""
+    if not path.name:
+        raise RecordingError("The file of the map has no name: give one, such as map.json.")
     name = path.suffix.lower().removeprefix(".")
     if name not in FORMATS:
         endings = (*(f".{known}" for known in FORMATS), *others)

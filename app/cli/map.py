@@ -54,8 +54,7 @@ def map_recording(
     from .map_run import build, without_odometry, write_files
 
     check_new_folder(output)
-    if not replace:
-        _check_free(output)
+    _check_free(output, replace)
     chosen = settings_from(settings, set_)
     opened = open_recording(recording, topic, chosen.sensor.mask)
     with counting("scans", for_programs) as count:
@@ -71,11 +70,21 @@ def map_recording(
         typer.echo(f"Left out: {plural(len(built.left_out), 'scan')}, the first of them {built.left_out[0]}.")
 
 
-def _check_free(folder: Path) -> None:
-    """A map may be hours of work, and what people drew on its plan. Raises FileExistsError if the folder has one."""
+def _check_free(folder: Path, replace: bool) -> None:
+    """A map may be hours of work, and what people drew on its plan.
+
+    Raises FileExistsError if the folder has one that is not to be replaced, IsADirectoryError if it cannot be.
+    """
     from .map_run import files_of_a_map
 
-    if there := files_of_a_map(folder):
+    there = files_of_a_map(folder)
+    if folders := [name for name in there if (folder / name).is_dir()]:
+        raise IsADirectoryError(
+            errno.EISDIR,
+            f"holds a folder {folders[0]}, where a file of the map belongs; give another folder for --output",
+            str(folder),
+        )
+    if there and not replace:
         raise FileExistsError(
             errno.EEXIST,
             f"holds {there[0]} already; give another folder for --output, or replace the map there by --replace",

@@ -129,6 +129,18 @@ def test_poses_are_written_as_csv_only(tmp_path: Path) -> None:
         assert_refused(refused, "The file to write has no name: give one, such as results.csv.")
 
 
+def test_a_map_to_save_without_a_name_is_told_before_the_work() -> None:
+    refused = run("localize", "no-recording.npz", "--save-map", "")
+    assert_refused(refused, "The file of the map has no name: give one, such as map.json.")
+
+
+def test_a_folder_where_a_file_of_a_map_belongs_is_told_before_the_work(tmp_path: Path) -> None:
+    """Found at the end, it would leave files of two maps."""
+    (tmp_path / "plan.dxf").mkdir()
+    refused = run("map", "no-recording.npz", "-o", tmp_path, "--replace")
+    assert_refused(refused, "holds a folder plan.dxf, where a file of the map belongs")
+
+
 @pytest.mark.parametrize("command", ["info", "localize"])
 def test_a_recording_without_a_name_is_not_the_working_folder(command: str) -> None:
     refused = run(command, "")
