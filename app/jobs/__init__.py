@@ -1,1 +1,1 @@
-"""Work beside the frames: recorder, map store, calibration, studies, profiles."""
+"""Work beside the frames: recorder, maps, calibration, studies, profiles."""

@@ -13,13 +13,13 @@ from lidarcore.body_mask import masked
 from lidarcore.errors import LandmarkMapError
 
 from ..jobs.calibration import LiveCalibration
-from ..jobs.landmark_store import LandmarkStore
-from ..jobs.map_maker import MapMaker
+from ..jobs.maps.maker import MapMaker
+from ..jobs.maps.store import LandmarkStore
 from ..jobs.profiles import Profiles
 from ..jobs.recorder import AsyncRecorder
 from ..jobs.repeatability import LiveRepeatability
 from ..jobs.sensor_memory import SensorMemory
-from ..jobs.studies import Studies
+from ..jobs.studies.runner import Studies
 from ..pipeline.navigation import Navigation
 from ..pipeline.runtime import Runtime
 from ..pipeline.sensor_setups import SensorSetups

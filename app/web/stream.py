@@ -14,10 +14,10 @@ from lidarcore.landmarks import Landmark
 from lidarcore.mapping.walls import WallTable
 
 from ..errors import explained
-from ..jobs.landmark_store import LandmarkStore
-from ..jobs.map_maker import MapMaker
+from ..jobs.maps.maker import MapMaker
+from ..jobs.maps.session_writer import MapChange
+from ..jobs.maps.store import LandmarkStore
 from ..jobs.recorder import AsyncRecorder
-from ..jobs.session_writer import MapChange
 from ..pipeline.frame import Frame
 from ..pipeline.runtime import Runtime
 from .schemas import OdometryPose

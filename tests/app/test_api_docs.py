@@ -4,10 +4,10 @@ from typing import Any
 import httpx
 import pytest
 from lidarcore_app.jobs.calibration import CalibrationStatus
-from lidarcore_app.jobs.map_making import MakingStatus
+from lidarcore_app.jobs.maps.making import MakingStatus
 from lidarcore_app.jobs.profiles import Profile, ProfileEntry
 from lidarcore_app.jobs.recorder import RecorderStatus
-from lidarcore_app.jobs.studies import StudyStatus
+from lidarcore_app.jobs.studies.runner import StudyStatus
 from lidarcore_app.pipeline.frame import Selection
 from lidarcore_app.pipeline.navigation import LocalizationStatus
 from lidarcore_app.pipeline.settings import Settings

@@ -11,8 +11,8 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
-from lidarcore_app.jobs.landmark_store import LandmarkStore
-from lidarcore_app.jobs.wall_writer import CONFIRMED
+from lidarcore_app.jobs.maps.store import LandmarkStore
+from lidarcore_app.jobs.maps.wall_writer import CONFIRMED
 from serving import CORNERS, Json, Server, assert_problem, wait_until, write_room
 
 from lidarcore.mapping.export import COVARIANCE_FILE

@@ -14,7 +14,7 @@ import lidarcore_app.web.stream
 import numpy as np
 import pytest
 import websockets
-from lidarcore_app.jobs.wall_writer import grid_to_stored
+from lidarcore_app.jobs.maps.wall_writer import grid_to_stored
 from lidarcore_app.pipeline.newest import NewestScan
 from lidarcore_app.web.stream import Mailbox
 from lidarcore_app.web.transport import SEND_BUFFER

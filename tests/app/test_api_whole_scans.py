@@ -10,7 +10,7 @@ from zipfile import ZipFile
 import ezdxf
 import numpy as np
 import pytest
-from lidarcore_app.jobs.wall_writer import CONFIRMED
+from lidarcore_app.jobs.maps.wall_writer import CONFIRMED
 from PIL import Image
 from serving import Server, assert_problem, wait_until
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import httpx
 import numpy as np
 import pytest
-from lidarcore_app.jobs.landmark_store import LandmarkStore
-from lidarcore_app.jobs.session_writer import MapChange
+from lidarcore_app.jobs.maps.session_writer import MapChange
+from lidarcore_app.jobs.maps.store import LandmarkStore
 from processes import Serving
 from serving import ROOT, wait_until, write_room
 from waiting import PATIENCE
@@ -296,7 +296,7 @@ import resource, signal, sys, time
 from pathlib import Path
 import numpy as np
 from test_landmark_store import landmarks
-from lidarcore_app.jobs.landmark_store import LandmarkStore
+from lidarcore_app.jobs.maps.store import LandmarkStore
 store = LandmarkStore(sys.argv[1])
 run = store.begin("full")
 limit = resource.getrlimit(resource.RLIMIT_FSIZE)
@@ -329,7 +329,7 @@ print(n, store.status.error)
 RUN = """
 import sys, time
 from test_landmark_store import landmarks
-from lidarcore_app.jobs.landmark_store import LandmarkStore
+from lidarcore_app.jobs.maps.store import LandmarkStore
 store = LandmarkStore(sys.argv[1])
 def say(*words):  # in one piece, as two threads do
     sys.stdout.write(" ".join(map(str, words)) + "\\n")

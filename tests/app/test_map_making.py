@@ -11,7 +11,7 @@ from zipfile import ZipFile
 import numpy as np
 import psutil
 import pytest
-from lidarcore_app.jobs.map_making import Making
+from lidarcore_app.jobs.maps.making import Making
 from lidarcore_app.pipeline.settings import Settings
 from serving import Json, Server, assert_problem, wait_until, write_room
 from two_lidars import write_two_lidars

@@ -12,7 +12,7 @@ import httpx
 import psutil
 import pytest
 from lidarcore_app.jobs.command_process import parts_done
-from lidarcore_app.jobs.study_reports import MOST
+from lidarcore_app.jobs.studies.reports import MOST
 from processes import ENVIRONMENT, Serving
 from serving import ROOT, Json, Server, assert_problem, write_room
 from waiting import wait_until

@@ -14,8 +14,8 @@ from zipfile import ZipFile
 import httpx
 import numpy as np
 import pytest
-from lidarcore_app.jobs.landmark_store import LandmarkStore
-from lidarcore_app.jobs.wall_writer import CONFIRMED, from_stored, grid_to_stored, to_stored
+from lidarcore_app.jobs.maps.store import LandmarkStore
+from lidarcore_app.jobs.maps.wall_writer import CONFIRMED, from_stored, grid_to_stored, to_stored
 from processes import Serving
 from serving import ROBOT, Server, assert_problem, write_room
 from waiting import wait_until

@@ -2,8 +2,8 @@
 
 import threading
 
-from lidarcore_app.jobs.session_writer import SessionWriter, Waiting
-from lidarcore_app.jobs.write_queue import MOST_RUNS, WriteQueue
+from lidarcore_app.jobs.maps.session_writer import SessionWriter, Waiting
+from lidarcore_app.jobs.maps.write_queue import MOST_RUNS, WriteQueue
 from waiting import PATIENCE
 
 

@@ -24,8 +24,8 @@ from lidarcore.landmarks import (
 )
 
 from ...errors import NotFoundError
-from ...jobs.landmark_store import LandmarkStore
-from ...jobs.map_name import stem_of
+from ...jobs.maps.names import stem_of
+from ...jobs.maps.store import LandmarkStore
 from ..downloads import text_file
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode

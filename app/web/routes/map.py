@@ -20,8 +20,8 @@ from lidarcore.mapping.grid import OccupancyGrid, shades_of, write_ros_map
 from lidarcore.mapping.walls import WallTable
 
 from ...errors import NotFoundError
-from ...jobs.landmark_store import LandmarkStore
-from ...jobs.map_name import called, stem_of
+from ...jobs.maps.names import called, stem_of
+from ...jobs.maps.store import LandmarkStore
 from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
 from .dependencies import Server

@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 
 from lidarcore import RecordingError, TopicError
 
-from ...jobs.map_making import MakingStatus
+from ...jobs.maps.making import MakingStatus
 from ...sources.recording_facts import RecordingFacts
 from ..problems import documented
 from ..schemas import StrictBody

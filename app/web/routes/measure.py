@@ -11,7 +11,7 @@ from lidarcore.mapping.export import COVARIANCE_FILE
 from lidarcore.mapping.walls import MOST_WALLS, JointWalls
 
 from ...errors import NotFoundError
-from ...jobs.map_name import called
+from ...jobs.maps.names import called
 from ..places import MeasuredFeatureJson, Place, found_at
 from ..problems import ProblemError, documented
 from ..state import State

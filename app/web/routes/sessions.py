@@ -10,7 +10,7 @@ from typing_extensions import TypedDict
 from lidarcore.landmarks import MAX_NAME, Session
 
 from ...errors import ConflictError
-from ...jobs.landmark_store import StoreStatus
+from ...jobs.maps.store import StoreStatus
 from ..problems import documented, encode
 from ..schemas import StrictBody
 from .dependencies import Server

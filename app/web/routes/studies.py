@@ -6,9 +6,9 @@ from fastapi import APIRouter, Body, Path
 from starlette.responses import FileResponse
 from typing_extensions import TypedDict
 
-from ...jobs.studies import ExpectedTime, StudyStatus, expected
-from ...jobs.study_kinds import KINDS, Kind
-from ...jobs.study_reports import ReportEntry
+from ...jobs.studies.kinds import KINDS, Kind
+from ...jobs.studies.reports import ReportEntry
+from ...jobs.studies.runner import ExpectedTime, StudyStatus, expected
 from ...records import record
 from ..problems import documented
 from .dependencies import Server

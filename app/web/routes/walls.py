@@ -16,9 +16,9 @@ from lidarcore.mapping.export import walls_csv, walls_geojson
 from lidarcore.mapping.walls import WallTable, along, distances, in_box, nearest
 
 from ...errors import NotFoundError
-from ...jobs.landmark_store import LandmarkStore
-from ...jobs.map_name import stem_of
-from ...jobs.wall_writer import from_stored
+from ...jobs.maps.names import stem_of
+from ...jobs.maps.store import LandmarkStore
+from ...jobs.maps.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
 from ..downloads import text_file
 from ..openapi import formats

@@ -10,8 +10,8 @@ from typing import Any
 
 from lidarcore.files import partials, write
 
-from ..errors import ConflictError, NotFoundError, storing
-from .study_kinds import KINDS
+from ...errors import ConflictError, NotFoundError, storing
+from .kinds import KINDS
 
 MOST = 100  # reports kept; the user deletes what is not needed any more
 NAME = re.compile(rf"({'|'.join(KINDS)})_\d{{4}}-\d\d-\d\d_\d\d-\d\d-\d\d(_\d+)?")

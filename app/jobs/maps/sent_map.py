@@ -16,7 +16,7 @@ from lidarcore.mapping.export import COVARIANCE_FILE, read_walls
 from lidarcore.mapping.grid import OccupancyGrid, read_ros_map
 from lidarcore.mapping.walls import WallTable
 
-from ..isolation import Isolated
+from ...isolation import Isolated
 
 MOST = 250_000  # landmarks, which take 100 MB; a house has some hundred
 _YAMLS = (".yaml", ".yml")

@@ -8,10 +8,10 @@ from tempfile import TemporaryDirectory
 from typing import Literal
 from zipfile import ZIP_DEFLATED, ZipFile
 
-from ..errors import storing
-from ..pipeline.settings import Settings
-from ..records import record
-from .command_process import CommandProcess
+from ...errors import storing
+from ...pipeline.settings import Settings
+from ...records import record
+from ..command_process import CommandProcess
 
 State = Literal["waiting", "running", "finished", "failed", "cancelled"]
 

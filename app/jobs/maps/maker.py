@@ -11,11 +11,11 @@ from lidarcore import LidarError
 from lidarcore.errors import LandmarkError
 from lidarcore.landmarks import MAX_NAME, session_name
 
-from ..errors import ConflictError, NotFoundError
-from ..pipeline.settings import Settings
-from .landmark_store import LandmarkStore
-from .map_making import Making, MakingStatus
-from .map_name import stem_of
+from ...errors import ConflictError, NotFoundError
+from ...pipeline.settings import Settings
+from .making import Making, MakingStatus
+from .names import stem_of
+from .store import LandmarkStore
 
 NO_FILES = (
     "No such map of a recording has files here: make one first, or see in GET /map/making which have ended. Files of "

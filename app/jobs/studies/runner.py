@@ -11,11 +11,11 @@ from typing import Any, Literal
 
 from lidarcore import SensorNoise
 
-from ..errors import ConflictError, NotFoundError
-from ..records import record
-from .command_process import CommandProcess
-from .study_kinds import KINDS, Options
-from .study_reports import ReportEntry, Reports
+from ...errors import ConflictError, NotFoundError
+from ...records import record
+from ..command_process import CommandProcess
+from .kinds import KINDS, Options
+from .reports import ReportEntry, Reports
 
 State = Literal["running", "finished", "failed", "cancelled"]
 MIN_SHARE = 0.05  # of the work done before what remains is estimated

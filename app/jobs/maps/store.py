@@ -15,8 +15,8 @@ from lidarcore.localization import from_stored as landmarks_from_stored
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import JointWalls, WallTable, unpack_covariance
 
-from .map_file import building_of, landmarks_of
-from .map_writer import MapWriter
+from .landmark_writer import MapWriter
+from .sent_map import building_of, landmarks_of
 from .session_writer import MapChange, SessionWriter
 from .wall_writer import (
     WallWriter,

@@ -1,0 +1,1 @@
+"""Maps beside the frames: how they are made, named, kept, and written to the disk."""

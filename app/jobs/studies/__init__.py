@@ -1,0 +1,1 @@
+"""Studies beside the frames: which there are, their runs, and the reports that stay."""
