@@ -13,6 +13,7 @@ from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import pose_difference, relative
 from lidarcore.mapping.graph.refinement import Refined, turned
 
+_SOME = 50  # steps that tell what the map keeps
 _LARGEST = 9.0  # a squared normalised difference counts no more: a keyframe may be found elsewhere after all
 
 
@@ -55,12 +56,20 @@ def covariances(refined: Refined, local: Array, numbers: Ints, ties: Ties) -> Ar
     return P
 
 
-def kept(refined: Refined, local: Array, scatter: Array) -> float:
-    """Share of the errors with which the front end placed keyframes that the finished map has, too.
+def kept(refined: Refined, scatter: Array) -> Array:
+    """How much (3,) of the errors with which single scans are placed, ahead, to the left and in heading, the finished
+    map has, too. Some of the steps tell it that surfaces tie.
 
-    scatter (K, 3) are the variances of these errors; those of the map are taken for as large.
+    scatter (K, 3) are the variances of these errors. An estimate that makes the most of what is known shares with any
+    other one its whole variance [Hausman, Econometrica 1978, lemma 2.1].
     """
-    return max(0.0, 1 - _replaced(refined, local, scatter) / 2)
+    joined = np.flatnonzero(refined.joined)
+    some = joined[:: max(1, len(joined) // _SOME)]
+    variances = [np.diagonal(refined.placed(k, k + 1).covariance) for k in some.tolist()]
+    if not variances:
+        return np.ones(3)
+    shares = np.median(variances / (scatter[some] + scatter[some + 1]), axis=0)
+    return np.minimum(shares, 1.0)
 
 
 def _replaced(refined: Refined, local: Array, variances: Array) -> float:

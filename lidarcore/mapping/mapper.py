@@ -65,7 +65,7 @@ class Mapper:
 
     def step(self, scan: Scan) -> Placement:
         """Place a scan. Raises MotionError if the clock went back or odometry jumped; nothing has changed then."""
-        tracked = self._front.step(scan)
+        tracked, unevenness = self._front.step(scan), self._settings.front.match.unevenness
         local = compose(self._locals[tracked.node], tracked.tie.pose) if self._locals else np.zeros(3)
         tie = tracked.node, tracked.tie
         if tracked.keyframe:
@@ -74,10 +74,10 @@ class Mapper:
             self._locals.append(local)
             self._refined = None
         if tracked.first is not None:
-            self._motions[0] = _motion_of(tracked.first)
+            self._motions[0] = _motion_of(tracked.first, unevenness)
         if tracked.is_news or tracked.view:
             self._back.add(tracked)
-        self._motions.append(_motion_of(tracked))
+        self._motions.append(_motion_of(tracked, unevenness))
         self._stamps.append(tracked.stamp)
         self._ties.append(tie)
         self._driven.append(tracked.moved.covariance)
@@ -101,11 +101,15 @@ class Mapper:
             self._take_distortion(refined)
             self._smooth_motion()
             refined = self._back.refine_again(parts)
-        of_keyframes = [self._motions[number] for number in self._numbers]
-        scatter = np.array([motion.scatter for motion in of_keyframes])
-        share = kept(refined, np.array(self._locals), scatter)
-        self._refined = replace(refined, sweeps=np.array([motion.stands(share) for motion in of_keyframes]))
+            refined = replace(refined, sweeps=self._sweeps(refined))
+        self._refined = refined
         self._loops = len(self._back.loops)
+
+    def _sweeps(self, refined: Refined) -> Array:
+        """(K, 3, 3) that poses of keyframes have besides: of where their scans stand."""
+        motions = [self._motions[number] for number in self._numbers]
+        share = kept(refined, np.array([motion.scatter for motion in motions]))
+        return np.array([motion.stands(share) for motion in motions])
 
     def _take_distortion(self, refined: Refined) -> None:
         """Let motions know what the surfaces that keyframes see again say of them."""
@@ -192,7 +196,7 @@ class Mapper:
         for number, (node, tie) in enumerate(self._ties):
             if number != self._numbers[node]:
                 matched[number] = tie.covariance - self._motions[number].sweep
-        sweeps = np.array([motion.stands(1.0) for motion in self._motions])
+        sweeps = np.array([motion.stands(np.ones(3)) for motion in self._motions])
         return Ties(nodes, poses, matched, np.array(self._driven), sweeps)
 
     @property
@@ -210,7 +214,7 @@ class Mapper:
         return compose(self._back.graph.poses[-1], inverse(self._locals[-1]))
 
 
-def _motion_of(tracked: Tracked) -> ScanMotion:
+def _motion_of(tracked: Tracked, unevenness: float) -> ScanMotion:
     variances = np.diagonal(tracked.tie.covariance - tracked.sweep)
     return ScanMotion(
         half=half_time(tracked.scan),
@@ -218,7 +222,7 @@ def _motion_of(tracked: Tracked) -> ScanMotion:
         acceleration=np.zeros(3),
         variances=variances,
         distorted=UNTOLD,
-        own=own_variances(tracked.patches),
+        own=own_variances(tracked.patches, unevenness),
         scatter=variances,
         sweep=tracked.sweep,
         shared=np.zeros((3, 3)),

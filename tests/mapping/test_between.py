@@ -4,16 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.sparse import csc_array
 
 from lidarcore import SensorNoise
 from lidarcore.errors import LocalizationError
 from lidarcore.evaluation.maps.honesty import drive
-from lidarcore.geometry import pose_difference, relative, rotation, squared_mahalanobis
+from lidarcore.geometry import compose, pose_difference, relative, rotation, squared_mahalanobis
 from lidarcore.mapping import Mapper, MapperSettings
 from lidarcore.mapping.between import _reduced, kept
 from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.graph.refinement import UNMEASURED, Refined
+from lidarcore.mapping.matching.motion_smoothing import _covered
 
 SETTINGS = MapperSettings().with_noise(SensorNoise(0.01, 0.001))
 
@@ -97,15 +99,39 @@ def test_here_is_where_the_newest_scan_was_placed_and_a_map_without_scans_is_ref
 
 @pytest.mark.parametrize("joined", [[True, True, False], [False, False, False]])
 def test_what_the_map_keeps_of_errors_is_told_by_keyframes_that_surfaces_tie(joined):
-    """It moved the second and third by their own deviation each, and left the step to the fourth as it was."""
-    local = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]])
-    poses = local + np.cumsum([np.zeros(3), np.full(3, 0.1), np.full(3, 0.1), np.zeros(3)], axis=0) * [
-        1,
-        1,
-        0,
-    ]
-    scatter = np.full((4, 3), 0.1**2 / 2)
+    """Poses are known to 1 m and 1 rad, each for itself; the last one is turned, so that its step says otherwise."""
+    poses = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 3, 1]])
+    scatter = np.array([[1.0, 2, 4]] * 4)
     recovery = Recovery(factor(csc_array(np.eye(12))))
     refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), UNMEASURED, recovery)
-    found = kept(refined, local, scatter)
-    assert found == pytest.approx(1 - (2 / 3 if any(joined) else 1) / 2)
+    assert kept(refined, scatter) == pytest.approx([1, 0.75, 0.25] if any(joined) else [1, 1, 1])
+
+
+def test_the_map_keeps_as_much_of_the_errors_of_single_scans_as_it_says():
+    """Against how errors of both, of where scans were on average, go together in simulated drives, while the robot goes
+    straight on: where it turns, those of its motion come in besides."""
+    told, products = [], []
+    for seed in range(8):
+        mapper, scans = Mapper(SETTINGS), drive("two rooms", 15, seed)
+        for scan in scans:
+            mapper.step(scan)
+        mapper.finish()
+        motions = [mapper._motions[number] for number in mapper._numbers]
+        scatter = np.array([motion.scatter for motion in motions])
+        told.append(kept(mapper._refined, scatter))
+        h = np.array([motion.half for motion in motions])
+        rates = np.array([[motion.velocity, motion.acceleration] for motion in motions])
+        stamps, true = (np.array([getattr(scan, name) for scan in scans]) for name in ("stamp", "truth"))
+        true[:, 2] = np.unwrap(true[:, 2])
+        way, begin = CubicSpline(stamps, true).antiderivative(), stamps[mapper._numbers][:-1]
+        means = (way(begin + 2 * h[:-1]) - way(begin)) / (2 * h[:-1, None])
+        errors = []
+        for poses in (np.array(mapper._locals), mapper._refined.poses):
+            at = compose(poses, _covered(rates, h[:, None]))[:-1]
+            errors.append(pose_difference(relative(at[:-1], at[1:]), relative(means[:-1], means[1:])))
+        is_steady = np.abs(rates[:-1, :, 2]).max(axis=1) < 0.2
+        squares = np.stack([errors[0] * errors[1], scatter[1:-1] + scatter[:-2]])
+        products.append(squares[:, is_steady[1:] & is_steady[:-1]])
+    together, scattered = np.concatenate(products, axis=1).mean(axis=1)
+    print(np.mean(told, 0), together / scattered, sum(one.shape[1] for one in products))
+    np.testing.assert_allclose(np.mean(told, 0), together / scattered, rtol=0.2)

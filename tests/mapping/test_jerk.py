@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from jerky_motions import motions, only
 from scipy.linalg import expm
+from scipy.optimize import minimize
 
-from lidarcore.mapping.matching.jerk import JERKS, PAIRS, Drive, estimated, window
+from lidarcore.mapping.matching.jerk import JERKS, PAIRS, Drive, _most_likely, estimated, window
+from lidarcore.mapping.matching.jerk_fits import evidences
 from lidarcore.mapping.matching.motion_smoothing import UNTOLD
 
 T = np.arange(-3, 4) / 10
@@ -112,6 +114,29 @@ def test_the_claims_hold_for_motions_whose_jerkiness_nobody_told():
     off = rates[:, :, 0] - np.stack([v, a], -1)[order]
     squares = np.einsum("ni,nij,nj->n", off, np.linalg.inv(C[:, 0]), off) / 2
     assert 0.85 < squares.mean() < 1.15
+
+
+def test_no_other_shares_of_jerks_explain_places_better():
+    """Against a solver for any function of shares that are positive and sum up to 1."""
+    rng = np.random.default_rng(8)
+    y = np.concatenate([wandered(rng, 40, jerk, step=0.01)[0] for jerk in (0.03, 0.3, 3.0)])
+    places = np.zeros((120, 7, 3))
+    places[:, :, 0] = y - y[:, 3:4] + rng.normal(0, SIGMA[0], y.shape)
+    given, some = around(places), np.arange(120)
+    found = np.empty((len(JERKS), 120, 3))
+    alike = np.stack([JERKS, JERKS], 1)
+    evidences(given, some, 1.0, alike, found)
+    likelihoods = np.exp(found[:, :, 0])
+    solved = minimize(
+        lambda shares: -np.log(shares @ likelihoods).mean(),
+        np.full(len(JERKS), 1 / len(JERKS)),
+        bounds=[(1e-9, 1)] * len(JERKS),
+        constraints={"type": "eq", "fun": lambda shares: shares.sum() - 1},
+    )
+    shares = _most_likely(given, some, 1.0, alike)[1][:, 0]
+    assert solved.success
+    assert shares.sum() == pytest.approx(1)
+    assert -np.log(shares @ likelihoods).mean() - solved.fun < 0.003
 
 
 def test_what_scatters_about_a_steady_way_is_noise_and_no_jerk():

@@ -124,7 +124,7 @@ def test_the_first_scan_is_as_far_off_as_its_own_place_and_the_speed_that_this_t
     for _ in range(150):
         at, after = smoothed(T, true + rng.normal(0, sigma, true.shape), given)
         for squares, k in ((ends, 0), (between, 6)):
-            P = sigma**2 * np.eye(3) + after[k].stands(1.0)
+            P = sigma**2 * np.eye(3) + after[k].stands(np.ones(3))
             off = pose_difference(at[k], true[k])
             squares.append(off @ np.linalg.solve(P, off) / 3)
     print(np.mean(ends), np.mean(between))

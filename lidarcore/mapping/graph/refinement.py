@@ -87,9 +87,13 @@ class Refined:
         P: Array = first + B @ (shared + turned(own, at[:, 2])) @ B.swapaxes(1, 2)
         return P
 
+    def placed(self, i: int, j: int) -> UncertainPose:
+        """T_i_j with its covariance, as if scans stood where they were placed."""
+        return self._recovery.relative(i, j, self.poses)
+
     def relative(self, i: int, j: int) -> UncertainPose:
         """T_i_j with its covariance."""
-        pose, P = self._recovery.relative(i, j, self.poses)
+        pose, P = self.placed(i, j)
         own_i, own_j = (turned(self.sweeps[k], self.poses[k, 2]) for k in (i, j))
         _, apart = relative_with_covariance(self.poses[i], self.poses[j], own_i, np.zeros((3, 3)), own_j)
         return UncertainPose(pose, P + apart)

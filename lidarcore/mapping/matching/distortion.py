@@ -42,9 +42,14 @@ def seen_since(scan: Scan, seen: Patches) -> Array:
     return since
 
 
-def own_variances(seen: Patches) -> Array:
-    """(3,) m², rad² of a scan's pose on surfaces that are known, by the noise of its patches alone."""
-    variances: Array = np.diagonal(np.linalg.inv(_equations(seen)[2]))
+def own_variances(seen: Patches, unevenness: float) -> Array:
+    """(3,) m², rad² of a scan's pose on surfaces that are known, by the noise of its patches alone.
+
+    unevenness m is what their variances contain besides: it weighs them, but the next scan finds it where it was.
+    """
+    _, W, H = _equations(seen)
+    noise, inverse = seen.variances - unevenness**2, np.linalg.inv(H)
+    variances: Array = np.diagonal(inverse @ (W.T @ (noise[:, None] * W) + _PRIOR) @ inverse)
     return variances
 
 

@@ -8,22 +8,22 @@ farther away, as a drive that was steady for long may just now become jerky
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import logsumexp, softmax
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.mapping.matching.jerk_fits import Densities, Window, evidences, mix
 from lidarcore.mapping.matching.white_jerk import wander
 
-JERKS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
+JERKS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
 """What may change an acceleration within a second, from the steadiest drive to the jerkiest: m/s², m/s², rad/s²."""
 _ALIKE = np.stack([JERKS, JERKS], 1)
 PAIRS = np.array([[far, near] for far in JERKS for near in JERKS])
-"""Densities (49, 2, 3) farther from the time than the nearest places, and near."""
+"""Densities (64, 2, 3) farther from the time than the nearest places, and near."""
 _NOISES = 2.0 ** np.arange(3, -8, -0.5)
 """Times the variances of places, which their noise may really have."""
 _ENOUGH = 300  # times that tell the noise
 _RAREST = 1e-9  # share of a density, at least: no drive is so long that it rules one out
-_ROUNDS = 20  # of expectation maximisation
+_SETTLED = 0.003  # share by which no density explains places better than all together: no other shares do
+_ROUNDS = 1000  # of expectation maximisation, at most
 _SHORTEST = 1e-8  # s that half a sweep takes, where it is taken at once
 
 
@@ -58,7 +58,7 @@ class Drive(NamedTuple):
 
     noise   times the variances of the places, which is what explains them best: poses of scans on one map share its
             errors, which are no noise from one to the next; one factor, as the same surfaces tell all dimensions
-    shares  (49, 3) how often each pair of densities of the jerk explains them best
+    shares  (64, 3) how often each pair of densities of the jerk explains them best
     """
 
     noise: float
@@ -78,11 +78,15 @@ def _most_likely(given: Window, some: Ints, noise: float, jerks: Array) -> tuple
     it largest."""
     found = np.empty((len(jerks), len(some), 3))
     evidences(given, some, noise, jerks, found)
-    shares = np.full((len(jerks), 3), 1 / len(jerks))
+    highest = found.max(axis=0)
+    likelihoods, shares = np.exp(found - highest), np.full((len(jerks), 3), 1 / len(jerks))
     for _ in range(_ROUNDS):
-        shares = softmax(found + np.log(shares)[:, None], axis=0).mean(axis=1)
-        shares = np.maximum(shares, _RAREST)
-    return float(logsumexp(found + np.log(shares)[:, None], axis=0).sum()), shares
+        mixed = np.einsum("nsd,nd->sd", likelihoods, shares)
+        gains = np.einsum("nsd,sd->nd", likelihoods, 1 / mixed) / len(some)
+        if gains.max() < 1 + _SETTLED:
+            break
+        shares = np.maximum(shares * gains, _RAREST)
+    return float((highest + np.log(mixed)).sum()), shares
 
 
 def estimated(given: Window, drive: Drive) -> tuple[Array, Array, Array]:

@@ -50,8 +50,8 @@ class ScanMotion(NamedTuple):
     shift: Array
     on: bool
 
-    def stands(self, kept: float) -> Array:
-        """Covariance that `sweep` adds to a pose that has `kept` of the error of its place.
+    def stands(self, kept: Array) -> Array:
+        """Covariance that `sweep` adds to a pose that has so much (3,) of the error of its place.
 
         A speed that is told by the place itself, wrong with it, makes the scan stand farther off, or less far.
         """
