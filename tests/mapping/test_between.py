@@ -12,7 +12,7 @@ from lidarcore.errors import LocalizationError
 from lidarcore.evaluation.maps.honesty import drive
 from lidarcore.geometry import compose, pose_difference, relative, rotation, squared_mahalanobis
 from lidarcore.mapping import Mapper, MapperSettings
-from lidarcore.mapping.between import _reduced, kept
+from lidarcore.mapping.between import _reduced, _replaced, kept
 from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.graph.refinement import UNMEASURED, Refined
 from lidarcore.mapping.matching.motion_smoothing import _covered
@@ -95,6 +95,17 @@ def test_here_is_where_the_newest_scan_was_placed_and_a_map_without_scans_is_ref
         np.testing.assert_allclose(mapper.here.pose, placed.pose, atol=1e-12)
     np.testing.assert_allclose(mapper.here.covariance, mapper.covariances()[-1], rtol=1e-9)
     assert len(mapper.keyframes.poses) > 3
+
+
+@pytest.mark.parametrize("joined", [[True, True, False], [False, False, False]])
+def test_what_the_map_replaces_is_told_by_keyframes_that_surfaces_tie(joined):
+    """It moved the second and third by their own deviation each, and left the step to the fourth as it was."""
+    local = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]])
+    poses = local + np.array([[0.0], [0.1], [0.2], [0.2]]) * [1, 1, 0]
+    recovery = Recovery(factor(csc_array(np.eye(12))))
+    refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), UNMEASURED, recovery)
+    share = _replaced(refined, local, np.full((4, 3), 0.1**2 / 2))
+    assert share == pytest.approx(2 / 3 if any(joined) else 1)
 
 
 @pytest.mark.parametrize("joined", [[True, True, False], [False, False, False]])
