@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 from lidarcore_app import isolation
-from lidarcore_app.jobs import map_file
+from lidarcore_app.jobs.maps import sent_map
 from lidarcore_app.sources import odometry_feed
 from lidarcore_app.sources.odometry_feed import MOST_PER_SECOND, OdometryFeed
 from lidarcore_app.web.routes import map as map_routes
@@ -142,7 +142,7 @@ def test_a_map_is_read_in_a_process_of_its_own(shared_server: Server, monkeypatc
 
 
 def test_a_map_of_more_landmarks_than_allowed_is_refused(shared_server: Server, monkeypatch) -> None:
-    monkeypatch.setattr(map_file, "MOST", 1500)
+    monkeypatch.setattr(sent_map, "MOST", 1500)
     head, row = "x_m,y_m,var_x_m2,cov_xy_m2,var_y_m2,kind\n", "1,1,1,0,1,corner\n"
     asked = {"params": {"format": "csv"}}
     assert shared_server.http.post("/map", content=head + 1500 * row, **asked).status_code == 201

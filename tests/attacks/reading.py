@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 
-from lidarcore_app.jobs import map_file
+from lidarcore_app.jobs.maps import sent_map
 
 from lidarcore import LidarError
 from lidarcore.landmarks import Atlas
@@ -46,7 +46,7 @@ def items(path: Path) -> Iterator[object]:
             for session in atlas.sessions():
                 yield from atlas[session.id]
     elif path.stem.startswith("map"):
-        yield from map_file._read(path, path.suffix[1:])
+        yield from sent_map._read(path, path.suffix[1:])
     else:
         yield from open_recording(path)
 

@@ -84,7 +84,7 @@ def of_text_in_latin_1(folder: Path) -> object:
             lambda folder: open_recording(folder / ("a" * 300)),
             "cannot be opened: File name too long.",
         ),
-        (of_another_database, "landmarks.db is an SQLite database, but no ROS 2 bag"),
+        (of_another_database, "landmarks.db is an SQLite database, but not a ROS 2 bag"),
         (lambda folder: Atlas(folder), "is a folder: give a file in it, such as /"),
         (lambda folder: Atlas(" "), "The name of the landmark map is empty: give a path"),
         (

@@ -115,7 +115,7 @@ def _topics(database: sqlite3.Connection, name: str) -> dict[int, tuple[str, str
     """
     if not all(stores_its_columns(database, table) for table in ("topics", "messages")):
         raise RecordingError(
-            f"{name} is an SQLite database, but no ROS 2 bag: it lacks the tables topics and messages."
+            f"{name} is an SQLite database, but not a ROS 2 bag: it lacks the tables topics and messages."
         )
     rows = database.execute("SELECT id, name, type FROM topics ORDER BY id LIMIT ?", (MOST_TOPICS + 1,))
     return {id_: (str(name), plain_type(str(type_))) for id_, name, type_ in rows}
