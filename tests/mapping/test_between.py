@@ -112,7 +112,9 @@ def test_what_the_map_replaces_is_told_by_keyframes_that_surfaces_tie(joined):
 def test_what_the_map_keeps_of_errors_is_told_by_keyframes_that_surfaces_tie(joined):
     """Poses are known to 1 m and 1 rad, each for itself; the last one is turned, so that its step says otherwise."""
     poses = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 3, 1]])
-    scatter = np.array([[1.0, 2, 4]] * 4)
+    scatter = np.array(
+        [[0.5, 2, 4]] * 4
+    )  # ahead less than the map's own: it has all of the error, and no more
     recovery = Recovery(factor(csc_array(np.eye(12))))
     refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), UNMEASURED, recovery)
     assert kept(refined, scatter) == pytest.approx([1, 0.75, 0.25] if any(joined) else [1, 1, 1])

@@ -32,7 +32,7 @@ _TABLE = np.dtype(
 )
 
 
-class MapWriter(SessionWriter):
+class LandmarkWriter(SessionWriter):
     """Writes the confirmed landmarks of a run."""
 
     _written: Table = np.empty(0, _TABLE)

@@ -15,7 +15,7 @@ from lidarcore.localization import from_stored as landmarks_from_stored
 from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import JointWalls, WallTable, unpack_covariance
 
-from .landmark_writer import MapWriter
+from .landmark_writer import LandmarkWriter
 from .sent_map import building_of, landmarks_of
 from .session_writer import MapChange, SessionWriter
 from .wall_writer import (
@@ -106,7 +106,7 @@ class LandmarkStore:
         less of it, as it began later or ended sooner, does not take the place of another.
         """
         self.use(None)
-        self._run = run = MapWriter(self.atlas, source, self._queue.schedule, replay)
+        self._run = run = LandmarkWriter(self.atlas, source, self._queue.schedule, replay)
         return run
 
     def begin_walls(self, source: str, replay: Hashable = None) -> SessionWriter:

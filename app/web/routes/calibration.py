@@ -12,10 +12,10 @@ from lidarcore.evaluation.calibration.calibrate import LEAST_SCANS
 
 from ...jobs.calibration import MOST_SCANS, CalibrationStatus
 from ...jobs.profiles import Profile, ProfileEntry
+from ..dependencies import Server
 from ..openapi import example
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import Server
 
 router = APIRouter(tags=["calibration"])
 

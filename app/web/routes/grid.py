@@ -19,10 +19,10 @@ from lidarcore.mapping.walls import WallTable
 
 from ...errors import NotFoundError, NotYetError
 from ...pipeline.runtime import Runtime
+from ..dependencies import Server
 from ..openapi import MEDIA_TYPES
 from ..problems import documented
 from ..state import State
-from .dependencies import Server
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422, 503))
 

@@ -26,11 +26,11 @@ from lidarcore.landmarks import (
 from ...errors import NotFoundError
 from ...jobs.maps.names import stem_of
 from ...jobs.maps.store import LandmarkStore
+from ..dependencies import Server
 from ..downloads import text_file
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
-from .dependencies import Server
 
 MOST, USUAL = 1000, 100  # landmarks of a page
 

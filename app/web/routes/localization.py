@@ -22,13 +22,13 @@ from ...pipeline.slam_run import Localization
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
 from ...records import record
+from ..dependencies import Server
 from ..downloads import text_file
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Body as Model
 from ..schemas import Coordinate, Matrix3, Number, OdometryPose, Row3
 from ..serializers import pose_json
-from .dependencies import Server
 
 router = APIRouter(tags=["localization"], responses=documented(422))
 

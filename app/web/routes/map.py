@@ -22,9 +22,9 @@ from lidarcore.mapping.walls import WallTable
 from ...errors import NotFoundError
 from ...jobs.maps.names import called, stem_of
 from ...jobs.maps.store import LandmarkStore
+from ..dependencies import Server
 from ..openapi import MEDIA_TYPES, example, formats
 from ..problems import ProblemError, documented
-from .dependencies import Server
 from .landmarks import SessionId, chosen_map
 
 MAX_BYTES = 32 << 20  # of a map that is loaded, some 150,000 landmarks

@@ -11,9 +11,9 @@ from lidarcore import RecordingError, TopicError
 
 from ...jobs.maps.making import MakingStatus
 from ...sources.recording_facts import RecordingFacts
+from ..dependencies import Server
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import Server
 
 router = APIRouter(prefix="/map/making", tags=["landmarks"])
 

@@ -12,10 +12,10 @@ from lidarcore.mapping.walls import MOST_WALLS, JointWalls
 
 from ...errors import NotFoundError
 from ...jobs.maps.names import called
+from ..dependencies import Server
 from ..places import MeasuredFeatureJson, Place, found_at
 from ..problems import ProblemError, documented
 from ..state import State
-from .dependencies import Server
 from .grid import asked_session
 
 router = APIRouter(prefix="/measure", tags=["frame"], responses=documented(404, 422, 503))

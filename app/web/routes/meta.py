@@ -13,8 +13,8 @@ from lidarcore.clusters import CLUSTERERS
 
 from ...records import record
 from ...scene.palette import METHOD_STYLES
+from ..dependencies import Server
 from ..openapi import formats
-from .dependencies import Server
 
 router = APIRouter(tags=["meta"])
 

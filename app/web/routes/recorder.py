@@ -9,9 +9,9 @@ from pydantic import Field
 from ...errors import ConflictError
 from ...jobs.recorder import RecorderStatus
 from ...sources.live import LiveSource
+from ..dependencies import Server
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import Server
 
 router = APIRouter(prefix="/recorder", tags=["recorder"])
 

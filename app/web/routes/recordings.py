@@ -9,9 +9,9 @@ from typing_extensions import TypedDict
 
 from ...sources.library import RecordingEntry
 from ...sources.recording_facts import RecordingFacts
+from ..dependencies import Server
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import Server
 
 router = APIRouter(prefix="/recordings", tags=["recordings"])
 

@@ -15,11 +15,11 @@ from lidarcore.evaluation.repeatability.summary import Summary
 from lidarcore.evaluation.repeatability.tables import to_csv
 
 from ...errors import NotFoundError
+from ..dependencies import Server
 from ..downloads import text_file
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Pair
-from .dependencies import Server
 
 router = APIRouter(prefix="/repeatability", tags=["repeatability"])
 

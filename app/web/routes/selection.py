@@ -6,9 +6,9 @@ from fastapi import APIRouter, Body
 from pydantic import model_validator
 
 from ...pipeline.frame import Selection
+from ..dependencies import Server
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import Server
 
 router = APIRouter(prefix="/selection", tags=["selection"])
 

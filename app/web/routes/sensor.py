@@ -12,9 +12,9 @@ from lidarcore.rplidar import FoundDevice, find_devices
 from ...errors import ConflictError
 from ...records import record
 from ...sources.live import LiveSource
+from ..dependencies import Server
 from ..problems import documented
 from ..schemas import StrictBody
-from .dependencies import Server
 
 router = APIRouter(tags=["sensor"])
 

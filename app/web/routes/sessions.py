@@ -11,9 +11,9 @@ from lidarcore.landmarks import MAX_NAME, Session
 
 from ...errors import ConflictError
 from ...jobs.maps.store import StoreStatus
+from ..dependencies import Server
 from ..problems import documented, encode
 from ..schemas import StrictBody
-from .dependencies import Server
 
 router = APIRouter(prefix="/sessions", tags=["landmarks"], responses=documented(503))
 

@@ -5,9 +5,9 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body
 
 from ...pipeline.settings import Settings
+from ..dependencies import Server
 from ..openapi import example, formats
 from ..problems import documented
-from .dependencies import Server
 
 router = APIRouter(prefix="/settings", tags=["settings"])
 

@@ -17,11 +17,11 @@ from ...sources.player import SourceStatus
 from ...sources.recorded import RecordingSource
 from ...sources.simulated import SimulationSource
 from ...sources.source import Source
+from ..dependencies import Server
 from ..openapi import formats
 from ..problems import documented
 from ..schemas import Body as Model
 from ..schemas import Number, StrictBody
-from .dependencies import Server
 
 router = APIRouter(prefix="/source", tags=["source"])
 

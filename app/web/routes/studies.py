@@ -10,8 +10,8 @@ from ...jobs.studies.kinds import KINDS, Kind
 from ...jobs.studies.reports import ReportEntry
 from ...jobs.studies.runner import ExpectedTime, StudyStatus, expected
 from ...records import record
+from ..dependencies import Server
 from ..problems import documented
-from .dependencies import Server
 
 router = APIRouter(prefix="/studies", tags=["studies"])
 

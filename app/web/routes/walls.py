@@ -20,12 +20,12 @@ from ...jobs.maps.names import stem_of
 from ...jobs.maps.store import LandmarkStore
 from ...jobs.maps.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
+from ..dependencies import Server
 from ..downloads import text_file
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from ..wall_json import WallJson, wall_rows
-from .dependencies import Server
 from .grid import asked_session, running_walls
 from .landmarks import USUAL, Limit, Metres, Region
 

@@ -41,9 +41,8 @@ def read_walls(folder: str | Path) -> WallTable:
     try:
         return unpack_covariance(path.read_bytes(), walls)
     except (OSError, MapFileError) as error:
-        raise MapFileError(
-            f"{path.name}: {reason(error)} Without this file the walls can be read."
-        ) from error
+        why = reason(error).rstrip(".")
+        raise MapFileError(f"{path.name}: {why}. Without this file the walls can be read.") from error
 
 
 def write_map(

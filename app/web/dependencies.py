@@ -5,8 +5,8 @@ from typing import Annotated
 from fastapi import Depends
 from starlette.requests import HTTPConnection
 
-from ...pipeline.frame import Frame
-from ..state import State
+from ..pipeline.frame import Frame
+from .state import State
 
 
 async def _state(connection: HTTPConnection) -> State:
