@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from lidarcore.arrays import Array
 from lidarcore.fields import number, settings
-from lidarcore.localization.ekf.kernels import odometry_variances
+from lidarcore.localization.ekf.motion_kernels import odometry_variances
 
 
 @settings

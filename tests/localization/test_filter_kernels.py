@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from numeric import jacobian
 
 from lidarcore.geometry import act_inverse
-from lidarcore.localization.ekf import kernels
+from lidarcore.localization.ekf import sighting_kernels
 from lidarcore.localization.ekf.motion import ConstantVelocity, Motion, OdometryMotion
 from lidarcore.localization.settings import OdometryNoise, VelocityNoise
 from lidarcore.scan import Array, Ints
@@ -62,9 +62,9 @@ def test_one_sighting_after_the_other_corrects_like_all_at_once(
     K = P @ H.T @ np.linalg.inv(S)
     expected_x = x + K @ innovation.ravel()
     expected_P = (np.eye(n) - K @ H) @ P @ (np.eye(n) - K @ H).T + K @ R @ K.T  # Joseph
-    found_S = kernels.innovation_covariance(x, P, z, noise, rows)
+    found_S = sighting_kernels.innovation_covariance(x, P, z, noise, rows)
     np.testing.assert_allclose(found_S, S, atol=1e-7 * (1 + np.abs(S).max(initial=0)))
-    kernels.correct(x, P, n, z, innovation, noise, rows)
+    sighting_kernels.correct(x, P, n, z, innovation, noise, rows)
     np.testing.assert_array_equal(P, P.T)
     np.testing.assert_allclose(P, expected_P, atol=1e-6)
     np.testing.assert_allclose(np.exp(1j * x[2]), np.exp(1j * expected_x[2]), atol=1e-6)
@@ -97,7 +97,7 @@ def test_where_landmarks_are_expected_and_how_well(seed: int, landmarks: int) ->
     rows = 3 + 2 * np.arange(landmarks)
     cross = np.array([P[:3, r : r + 2] for r in rows])
     own = np.array([P[r : r + 2, r : r + 2] for r in rows])
-    z, S = kernels.expect(x, P, x[3:].reshape(-1, 2), cross, own)
+    z, S = sighting_kernels.expect(x, P, x[3:].reshape(-1, 2), cross, own)
     for k, row in enumerate(rows.tolist()):
 
         def see(state: Array, row: int = row) -> Array:
@@ -113,9 +113,9 @@ def test_squared_distances_of_all_sightings_to_all_landmarks(seed: int, count: i
     rng = np.random.default_rng(seed)
     xy, z = rng.normal(size=(count, 2)), rng.normal(size=(landmarks, 2))
     R, S = (covariances(rng, m) for m in (count, landmarks))
-    found = kernels.all_squared_distances(xy, R, z, S)
+    found = sighting_kernels.all_squared_distances(xy, R, z, S)
     for k, i in np.ndindex(count, landmarks):
         nu = xy[k] - z[i]
         np.testing.assert_allclose(found[k, i], nu @ np.linalg.solve(R[k] + S[i], nu), rtol=1e-9)
     near = {i for i in range(landmarks) for k in range(count) if found[k, i] <= 2}
-    assert kernels.within_any(found, 2.0).tolist() == sorted(near)
+    assert sighting_kernels.within_any(found, 2.0).tolist() == sorted(near)

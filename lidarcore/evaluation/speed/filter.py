@@ -9,9 +9,9 @@ from lidarcore.arrays import Array
 from lidarcore.evaluation.speed.extraction import Timing, time_calls
 from lidarcore.geometry import act_inverse
 from lidarcore.localization import LocalizationSettings, Localizer, Points, Slam
-from lidarcore.localization.ekf import kernels
 from lidarcore.localization.ekf.motion import OdometryMotion
 from lidarcore.localization.ekf.passive import one_thread
+from lidarcore.localization.ekf.sighting_kernels import correct
 from lidarcore.localization.landmarks import Landmarks
 
 CORNERS = 12  # landmarks in sight of the localizer
@@ -53,7 +53,7 @@ def time_localizer(seed: int = 0) -> list[Timing]:
 
     def predict_and_update() -> None:
         motion.advance(x, P, 3, PERIOD, increment)
-        kernels.correct(x, P, 3, xy, innovation, seen.covariance, given)
+        correct(x, P, 3, xy, innovation, seen.covariance, given)
 
     return [
         time_calls("yardstick: np.linalg.solve, 3 x 3", lambda: np.linalg.solve(COVARIANCE, pose), 1),

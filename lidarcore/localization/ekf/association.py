@@ -12,7 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import chi_square_gate, squared_mahalanobis
-from lidarcore.localization.ekf import kernels
+from lidarcore.localization.ekf import sighting_kernels
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import LocalizationSettings
 
@@ -83,7 +83,7 @@ def match(
     observed: Points, z: Array, S: Array, kinds: ArrayLike, settings: LocalizationSettings
 ) -> Association:
     """Match what was seen with landmarks expected at z (L, 2) m, sensor frame, covariances S (L, 2, 2), kinds (L,)."""
-    distances = kernels.all_squared_distances(observed.xy, observed.covariance, z, S)
+    distances = sighting_kernels.all_squared_distances(observed.xy, observed.covariance, z, S)
     distances[np.asarray(observed.kinds)[:, None] != np.asarray(kinds)] = np.inf
     return associate(distances, settings)
 

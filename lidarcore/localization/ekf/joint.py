@@ -13,7 +13,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import act, act_jacobians, wrap
-from lidarcore.localization.ekf import kernels
+from lidarcore.localization.ekf import map_kernels, motion_kernels, sighting_kernels
 from lidarcore.localization.ekf.estimate import Innovation
 from lidarcore.localization.ekf.passive import Gaussian, Passive
 
@@ -66,13 +66,13 @@ class JointState:
 
     def predict(self, state: Array, F: Array, Q: Array) -> None:
         """Put the motion state (d,) in place of the old one; F (d, d) is its Jacobian, Q (d, d) the noise."""
-        kernels.propagate(self._active.x, self._active.P, self._active.n, state, F, Q)
+        motion_kernels.propagate(self._active.x, self._active.P, self._active.n, state, F, Q)
 
     def within_reach(self, xy: Array, noise: Array, gate: float) -> Ints:
         """Landmarks (N,) within the gate of a sighting xy (K, 2) m with noise (K, 2, 2); a few others too."""
         self._passive.settle()
-        z, S = kernels.expect(self.state, self._active.P, *self._survey(self._slots))
-        near = kernels.within_any(kernels.all_squared_distances(xy, noise, z, S), gate)
+        z, S = sighting_kernels.expect(self.state, self._active.P, *self._survey(self._slots))
+        near = sighting_kernels.within_any(sighting_kernels.all_squared_distances(xy, noise, z, S), gate)
         self._use(self._slots[near])
         self._activate(self._slots[near])
         return near
@@ -80,19 +80,21 @@ class JointState:
     def expected(self, landmarks: Ints) -> tuple[Array, Array]:
         """Where landmarks (N,) appear in the sensor frame (N, 2), and how uncertain that is (N, 2, 2)."""
         self._activate(self._slots[landmarks])
-        return kernels.expect(self.state, self._active.P, *self._survey(self._slots[landmarks]))
+        return sighting_kernels.expect(self.state, self._active.P, *self._survey(self._slots[landmarks]))
 
     def jointly_expected(self, landmarks: Ints, noise: Array) -> tuple[Array, Array]:
         """Where the landmarks (P,) appear (P, 2), and S (2 P, 2 P) of their sightings with this noise (P, 2, 2)."""
         z, rows = self.expected(landmarks)[0], self._rows[self._slots[landmarks]]
-        return z, kernels.innovation_covariance(self._active.x, self._active.P, z, noise, rows)
+        return z, sighting_kernels.innovation_covariance(self._active.x, self._active.P, z, noise, rows)
 
     def correct(self, innovation: Innovation, noise: Array) -> None:
         """Add what the innovation tells, given the noise (P, 2, 2) of its sightings."""
         landmarks = innovation.association.landmark
         z, g = self.expected(landmarks)[0], self._active
         before = g.x.copy()
-        kernels.correct(g.x, g.P, g.n, z, innovation.value, noise, self._rows[self._slots[landmarks]])
+        sighting_kernels.correct(
+            g.x, g.P, g.n, z, innovation.value, noise, self._rows[self._slots[landmarks]]
+        )
         self._carry(before)
 
     def add(self, points: Array, covariances: Array) -> None:
@@ -139,7 +141,7 @@ class JointState:
     def _survey(self, slots: Ints, passive: Array | None = None) -> tuple[Array, Array, Array]:
         """Means (N, 2), covariances with the pose (N, 3, 2) and own (N, 2, 2), of passive ones these or at least so."""
         g, far, own = self._active, self._passive, self._passive.own if passive is None else passive
-        return kernels.survey(
+        return map_kernels.survey(
             g.x, g.P, self._rows[slots], slots, self._coefficients, self._left, far.x, far.base, own
         )
 
@@ -148,7 +150,7 @@ class JointState:
         g, rows = self._active, self._rows[self._slots]
         places = np.concatenate([[0], rows[rows >= 0]])
         coordinates = places[:, None] + [0, 1]
-        kernels.carry(g.P, g.n, places, g.x[coordinates] - before[coordinates])
+        map_kernels.carry(g.P, g.n, places, g.x[coordinates] - before[coordinates])
 
     def _activate(self, slots: Ints) -> None:
         """Bring landmarks back from the passive part: x = x_0 + B_0^T theta is linear in the coefficients."""
@@ -162,7 +164,7 @@ class JointState:
         first = g.append(xy, cross, rows[:, columns] + cross[:, old] @ T.T)
         self._rows[slots] = first + 2 * np.arange(len(slots))
         self._follow(first + np.arange(k))
-        kernels.carry(g.P, g.n, self._rows[slots], xy.reshape(-1, 2) - self._left[slots])
+        map_kernels.carry(g.P, g.n, self._rows[slots], xy.reshape(-1, 2) - self._left[slots])
         far.base = np.vstack([far.base, rows])
         self._use(needed)
         self._compress(len(needed))

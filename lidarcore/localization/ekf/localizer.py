@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, act_inverse, chi_square_gate, rotation
 from lidarcore.localization.coincidence import densities, evidence
-from lidarcore.localization.ekf import kernels
+from lidarcore.localization.ekf import motion_kernels, sighting_kernels
 from lidarcore.localization.ekf.association import match
 from lidarcore.localization.ekf.estimate import Estimate, Innovation, Instant, as_pose
 from lidarcore.localization.ekf.motion import motion_model, start
@@ -94,26 +94,28 @@ class Localizer:
         """Go so many seconds on at the velocity of the state: a change of variables that can be undone."""
         if time != 0:
             state, F = self._motion.glide(x, time)
-            kernels.propagate(x, P, len(x), state, F, np.zeros_like(F))
+            motion_kernels.propagate(x, P, len(x), state, F, np.zeros_like(F))
 
     def _correct(self, x: Array, P: Array, observed: Points) -> Innovation:
         """Correct by the compatible pairs, and tell them."""
         known, independent = self.landmarks, np.zeros((len(self.landmarks), 3, 2))
-        z, S = kernels.expect(x, P, known.xy, independent, known.covariance)
+        z, S = sighting_kernels.expect(x, P, known.xy, independent, known.covariance)
         far = chi_square_gate(self.settings.new_gate)
-        near = kernels.within_any(kernels.all_squared_distances(observed.xy, observed.covariance, z, S), far)
+        near = sighting_kernels.within_any(
+            sighting_kernels.all_squared_distances(observed.xy, observed.covariance, z, S), far
+        )
         association = match(observed, z[near], S[near], np.asarray(known.kinds)[near], self.settings).of(near)
         i, j = association.observed, association.landmark
         R_world_sensor, given = rotation(x[2]), np.full(len(j), -1)
         noise = observed.covariance[i] + R_world_sensor.T @ known.covariance[j] @ R_world_sensor
-        S_pairs = kernels.innovation_covariance(x, P, z[j], noise, given)
+        S_pairs = sighting_kernels.innovation_covariance(x, P, z[j], noise, given)
         innovation, kept = Innovation(association, observed.xy[i] - z[j], S_pairs).compatible(
             self.settings.gate
         )
         told = evidence(innovation.value, innovation.covariance, self._density[j[kept]])
         if told < np.log(self.settings.ambiguity):
             return innovation.doubted()
-        kernels.correct(x, P, len(x), z[j[kept]], innovation.value, noise[kept], given[kept])
+        sighting_kernels.correct(x, P, len(x), z[j[kept]], innovation.value, noise[kept], given[kept])
         return innovation
 
 

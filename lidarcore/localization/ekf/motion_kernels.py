@@ -8,7 +8,6 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 from lidarcore.geometry.kernels import compose_with_jacobians, rotate, rotated_covariance
-from lidarcore.localization.ekf.kernels import odometry_variances, propagate
 
 _SERIES = 1e-3  # rad, below which the series of the arc is exact to rounding and its quotients are not
 _NODES, _WEIGHTS = (
@@ -53,6 +52,15 @@ def drift(velocity: Array, dt: float) -> tuple[Array, Array]:
         ]
     )
     return np.array([ahead[0] - left[1], ahead[1] + left[0], ahead[2]]), J_drift
+
+
+@kernel
+def odometry_variances(increment: Array, dt: float, noise: Array) -> tuple[float, float, float]:
+    """Variances of an increment (3,) m, m, rad over dt s, in the sensor frame before it, from OdometryNoise.table."""
+    way, turn = np.hypot(increment[0], increment[1]), np.abs(increment[2])
+    slip = noise[4] ** 2 * turn + noise[5] ** 2 * dt
+    heading = noise[2] ** 2 * way + noise[3] ** 2 * turn + noise[6] ** 2 * dt
+    return noise[0] ** 2 * way + slip, noise[1] ** 2 * way + slip, heading
 
 
 @kernel
@@ -122,6 +130,27 @@ def at_constant_velocity(state: Array, dt: float, rates: Array) -> tuple[Array, 
                 for k in range(3):
                     Q[i, j] += _WEIGHTS[node] * dt * effect[i, k] * rates[k] * effect[j, k]
     return end, F, Q
+
+
+@kernel
+def propagate(x: Array, P: Array, n: int, state: Array, F: Array, Q: Array) -> None:
+    """Put a predicted state (d,) in place of the first d entries: F (d, d) is its Jacobian, Q (d, d) the noise."""
+    d = len(state)
+    FP = np.zeros((d, n))
+    for i in range(d):
+        for k in range(d):
+            if F[i, k] != 0.0:
+                for j in range(n):
+                    FP[i, j] += F[i, k] * P[k, j]
+    for i in range(d):
+        x[i] = state[i]
+        for j in range(d, n):
+            P[i, j] = P[j, i] = FP[i, j]
+        for j in range(i + 1):
+            entry = Q[i, j]
+            for k in range(d):
+                entry += FP[i, k] * F[j, k]
+            P[i, j] = P[j, i] = entry
 
 
 @kernel

@@ -15,7 +15,7 @@ import scipy.linalg
 from threadpoolctl import ThreadpoolController
 
 from lidarcore.arrays import Array, Bools, Ints
-from lidarcore.localization.ekf.kernels import subtract_products
+from lidarcore.localization.ekf.map_kernels import subtract_products
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

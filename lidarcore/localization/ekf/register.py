@@ -7,7 +7,7 @@ from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import chi_square_gate, squared_mahalanobis
 from lidarcore.localization.ekf.association import Association
 from lidarcore.localization.ekf.joint import JointState
-from lidarcore.localization.ekf.kernels import near_pairs
+from lidarcore.localization.ekf.map_kernels import near_pairs
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.settings import LocalizationSettings
 from lidarcore.localization.visibility import Costs
