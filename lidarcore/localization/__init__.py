@@ -7,16 +7,12 @@ from lidarcore.localization.ekf.estimate import Estimate, as_pose
 from lidarcore.localization.ekf.localizer import Localizer
 from lidarcore.localization.ekf.slam import Slam
 from lidarcore.localization.landmarks import Landmarks, from_stored, to_stored
+from lidarcore.localization.motion_noise import OdometryNoise, VelocityNoise
 from lidarcore.localization.navigator import Navigator
 from lidarcore.localization.points import Points
 from lidarcore.localization.precompile import warm_up
 from lidarcore.localization.relocation import Relocation, relocalize
-from lidarcore.localization.settings import (
-    LocalizationSettings,
-    NavigationSettings,
-    OdometryNoise,
-    VelocityNoise,
-)
+from lidarcore.localization.settings import LocalizationSettings, NavigationSettings
 from lidarcore.localization.tracking_result import TrackingResult
 
 __all__ = [

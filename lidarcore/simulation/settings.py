@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from lidarcore.arrays import Array
 from lidarcore.fields import number, settings, whole
-from lidarcore.localization.settings import OdometryNoise
+from lidarcore.localization.motion_noise import OdometryNoise
 from lidarcore.noise import SensorNoise
 from lidarcore.simulation.worlds import WORLDS, place
 

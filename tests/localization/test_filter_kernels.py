@@ -8,7 +8,7 @@ from numeric import jacobian
 from lidarcore.geometry import act_inverse
 from lidarcore.localization.ekf import sighting_kernels
 from lidarcore.localization.ekf.motion import ConstantVelocity, Motion, OdometryMotion
-from lidarcore.localization.settings import OdometryNoise, VelocityNoise
+from lidarcore.localization.motion_noise import OdometryNoise, VelocityNoise
 from lidarcore.scan import Array, Ints
 
 seeds = st.integers(0, 2**32 - 1)

@@ -7,7 +7,7 @@ from numeric import jacobian
 from lidarcore.geometry import act_inverse, compose
 from lidarcore.localization.ekf.motion import ConstantVelocity, OdometryMotion, OdometryWithVelocity
 from lidarcore.localization.ekf.motion_kernels import arc
-from lidarcore.localization.settings import OdometryNoise, VelocityNoise
+from lidarcore.localization.motion_noise import OdometryNoise, VelocityNoise
 from lidarcore.scan import Array
 
 metres, angles, rates = st.floats(-20, 20), st.floats(-3, 3), st.floats(-4, 4)

@@ -7,7 +7,7 @@ import numpy as np
 from lidarcore import Scan, SensorNoise
 from lidarcore.arrays import Array
 from lidarcore.geometry import compose, relative
-from lidarcore.localization.settings import OdometryNoise
+from lidarcore.localization.motion_noise import OdometryNoise
 from lidarcore.mapping import FrontSettings, MapperSettings, MatchSettings
 from lidarcore.simulation import SimulatedSensor, World
 

@@ -20,7 +20,8 @@ from lidarcore.localization.ekf.motion_kernels import (
     by_odometry_with_velocity,
     glide,
 )
-from lidarcore.localization.settings import LocalizationSettings, OdometryNoise, VelocityNoise
+from lidarcore.localization.motion_noise import OdometryNoise, VelocityNoise
+from lidarcore.localization.settings import LocalizationSettings
 
 _STANDING = np.zeros(3)
 
