@@ -17,10 +17,11 @@ from lidarcore.errors import (
     TopicError,
 )
 from lidarcore.extraction import compare, extract, warm_up
-from lidarcore.features import Corners, Features, Rejection, Segments
+from lidarcore.features import Corners, Features, Segments
 from lidarcore.lines import FITTERS, Line, Lines
 from lidarcore.noise import SensorNoise
 from lidarcore.recordings import open_recording
+from lidarcore.rejections import Rejection
 from lidarcore.scan import Scan
 from lidarcore.sensors import SENSORS, SensorKind
 from lidarcore.settings import ExtractionSettings

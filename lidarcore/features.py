@@ -1,41 +1,23 @@
-"""What extraction found in one scan: segments, corners, and what it rejected and why.
+"""What extraction found in one scan: segments, corners, and what it rejected.
 
 Each class is a view over one table written by the compiled kernel (a row for each thing found), so making it
 costs next to nothing; fields are cut from the table when they are asked for. All are in the sensor frame.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, overload
 
 import numpy as np
 
 from lidarcore import tables
-from lidarcore.lines import STATUS_MESSAGES, Lines
+from lidarcore.lines import Lines
 from lidarcore.lines.line import ABOUT_MEAN, ABOUT_TRUTH, normal_angle, to_second_order
+from lidarcore.rejections import Rejections
 from lidarcore.scan import Array, Ints, Scan
 from lidarcore.settings import Covariance, ExtractionSettings
+from lidarcore.table_view import TableView
 
 
-class _View:
-    """Rows of a kernel's table, and which of the covariances `covariance` means."""
-
-    def __init__(self, table: Array, which: Covariance) -> None:
-        self._table = table
-        self._which = which
-
-    def __len__(self) -> int:
-        return len(self._table)
-
-    def __repr__(self) -> str:
-        return f"<{len(self)} {type(self).__name__.lower()}, {self._which} covariances>"
-
-    def _matrices(self, column: int) -> Array:
-        return self._table[:, column : column + 4].reshape(-1, 2, 2)
-
-
-class Segments(_View):
+class Segments(TableView):
     """M wall segments in the order of the ring; uneven says whether the noise model knows that walls are."""
 
     def __init__(self, table: Array, which: Covariance, uneven: bool) -> None:
@@ -98,7 +80,7 @@ class Segments(_View):
         return self._table[:, tables.RMS]
 
 
-class Corners(_View):
+class Corners(TableView):
     """K corners in the order of the ring."""
 
     @property
@@ -150,68 +132,6 @@ class Corners(_View):
     def angle(self) -> Array:
         """(K,) rad between the two lines, in (0, pi/2]."""
         return np.arcsin(np.minimum(self._table[:, tables.SINE], 1.0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Rejection:
-    """A piece that is no segment, or a pair of neighbours that makes no corner, and why."""
-
-    kind: Literal["segment", "corner"]
-    reason: str
-    message: str
-    first_beam: int
-    last_beam: int
-    xy: Array
-    value: float
-    limit: float
-
-
-class Rejections(_View, Sequence[Rejection]):
-    """All rejections of one scan, made readable when asked for."""
-
-    @overload
-    def __getitem__(self, i: int) -> Rejection: ...
-    @overload
-    def __getitem__(self, i: slice) -> list[Rejection]: ...
-    def __getitem__(self, i: int | slice) -> Rejection | list[Rejection]:
-        if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(len(self)))]
-        row = self._table[i]
-        value, limit, why = float(row[tables.VALUE]), float(row[tables.LIMIT]), int(row[tables.REASON])
-        kind, reason, text = _REASONS[why]
-        found = STATUS_MESSAGES.get(int(value), "") if why == tables.DEGENERATE else ""
-        message = text.format(
-            value=value, limit=limit, found=found, angle=_degrees(value), least=_degrees(limit)
-        )
-        first_beam, last_beam = row[tables.REJECTED_BEAMS : tables.REJECTED_BEAMS + 2].astype(int).tolist()
-        xy = row[tables.REJECTED_XY : tables.REJECTED_XY + 2]
-        return Rejection(kind, reason, message, first_beam, last_beam, xy, value, limit)
-
-
-def _degrees(sine: float) -> float:
-    return float(np.degrees(np.arcsin(min(sine, 1.0))))
-
-
-_REASONS: dict[int, tuple[Literal["segment", "corner"], str, str]] = {
-    tables.TOO_FEW_POINTS: (
-        "segment",
-        "too few points",
-        "Too few points in a line: {value:.0f}, and min_points is {limit:.0f}.",
-    ),
-    tables.TOO_SHORT: ("segment", "too short", "Too short: {value:.2f} m, and min_length is {limit:.2f} m."),
-    tables.DEGENERATE: ("segment", "no line", "The fitter gave no line: {found}."),
-    tables.TOO_FLAT: (
-        "corner",
-        "angle too small",
-        "The walls are too parallel: {angle:.0f}° apart, and corner_angle is {least:.0f}°.",
-    ),
-    tables.TOO_FAR: (
-        "corner",
-        "ends too far",
-        "The walls' lines meet {value:.2f} m beyond the end of one of them (occlusion or opening); "
-        "corner_gap allows {limit:.2f} m.",
-    ),
-}
 
 
 class Features:
