@@ -162,3 +162,7 @@ _NUMBERS = [(name, float, as_number) for name in _FLOATS] + [
     (name, int, as_integer) for name in ("count", "id")
 ]
 COLUMNS = tuple(field.name for field in fields(Landmark))
+"""A landmark's fields, in the order of its parameters."""
+
+Row = dict[str, Any]
+"""A landmark's fields by their names, unchecked."""
