@@ -12,7 +12,7 @@ from lidarcore.arrays import Array
 from lidarcore.compiled import inlined, kernel
 from lidarcore.errors import DegenerateLineError, ScanError
 from lidarcore.lines import arras_siegwart, cwlf, ml, tls
-from lidarcore.lines.covariance import Free, covariances
+from lidarcore.lines.covariance import covariances
 from lidarcore.lines.line import ABOUT_MEAN, ABOUT_TRUTH, Line, Lines, normal_angle, to_second_order
 from lidarcore.lines.regression import (
     BEYOND,
@@ -28,6 +28,7 @@ from lidarcore.lines.regression import (
     Work,
     store,
 )
+from lidarcore.lines.unevenness import Free
 from lidarcore.noise import NoiseModel, SensorNoise
 from lidarcore.polar import cos_sin
 from lidarcore.scan import MAX_BEARING, as_row

@@ -1,7 +1,6 @@
 """How far off a line is: first-order covariances of a weighted regression under the noise of beams and walls.
 
-Errors of beams are independent, a wall's unevenness is not: it is an Ornstein-Uhlenbeck process along the wall, with
-the covariance s² exp(-|t_i - t_j| / L), and sums over all pairs of beams follow from one pass along it.
+Errors of beams are independent, a wall's unevenness is not.
 """
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import inlined
 from lidarcore.lines.regression import Normal, Sym2, Work
+from lidarcore.lines.unevenness import Free, exp_negative, resampled_sums, unevenness_sums
 from lidarcore.noise import NoiseModel
 
 _PRIOR_WEIGHT = 4.0  # of a room's unevenness against the independent stretches of one wall
@@ -19,7 +19,6 @@ _SMOOTHEST = 0.25  # of the variance expected: ranges may also be alike because 
 
 _NOTHING: Sym2 = (0.0, 0.0, 0.0)
 
-Free = tuple[bool, bool]
 Regression = tuple[float, float, float]  # sum of weights, weighted mean of t, centred second moment of t
 
 
@@ -123,7 +122,7 @@ def _pattern(
         residual += w[i] * min(e * e, _GROSS * (v + noise.v_wall))
         expected += w[i] * v
         if i > 0:
-            alike = _exp_negative(np.abs(at - t[i - 1]) / noise.length)
+            alike = exp_negative(np.abs(at - t[i - 1]) / noise.length)
             step, of_step = e - e_before, v + v_before + 2 * noise.v_wall * (1 - alike)
             steps += min(step * step / of_step, _GROSS)
         v_before, e_before = v, e
@@ -148,72 +147,3 @@ def _pattern(
 def _gained(v: float, k00: float, k01: float, k11: float, a0: float, d: float) -> Sym2:
     """Covariance of (alpha, height over the mean), by sums over errors of variance v."""
     return v * k11 / (d * d), -v * k01 / (a0 * d), v * k00 / (a0 * a0)
-
-
-@inlined
-def resampled_sums(
-    w: Array, t: Array, decay: Array, length: float, resampling: float, free: Free
-) -> tuple[float, float, float]:
-    """The sums of `unevenness_sums`, of what differs if beams fall elsewhere, by `resampling`, and ends change.
-
-    With a = spacing / (2 length), and a shift of all beams that is anywhere within the spacing, the covariance of two
-    such samples of one wall is that of the process times sinh(a) / a, but (1 - exp(-a)) / a of a beam with itself. What
-    they do not share, summed over the neighbours, is a variance of coth(a) - 1 / a for each beam, independent: a / 3
-    where beams are dense, which hardly miss anything between them, 1 where they are far apart.
-    Wherever beams fall, noise brings one at either end or takes it away: it is counted as found anew, and at a free
-    end the one beside it, too. Where two walls meet, both of their lines say where they end, and no more than a beam
-    changes sides.
-    """
-    n = len(t)
-    l00 = l01 = l11 = 0.0
-    for i in range(n):
-        before, after = max(i - 1, 0), min(i + 1, n - 1)
-        a = np.abs(t[after] - t[before]) / ((after - before) * 2 * length)
-        x = a * a
-        langevin = min(a * (35 + x) / (105 + 10 * x), 1.0)  # a continued fraction
-        v = resampling * w[i] * w[i] * langevin
-        l00 += v
-        l01 += v * t[i]
-        l11 += v * t[i] * t[i]
-    for end in (slice(0, 2 if free[0] else 1), slice(n - (2 if free[1] else 1), n)):
-        e00, e01, e11 = unevenness_sums(w[end], t[end], decay[end], length)
-        l00, l01, l11 = l00 + e00, l01 + e01, l11 + e11
-    return l00, l01, l11
-
-
-@inlined
-def unevenness_sums(w: Array, t: Array, decay: Array, length: float) -> tuple[float, float, float]:
-    """Sums over all i, j of a_i b_j exp(-|t_i - t_j| / length) for (a, b) = (w, w), (w, w t) and (w t, w t).
-
-    t (N,) is in the order of the wall; decay (N,) is scratch. What is left of all beams before decays from one to the
-    next: O(N) instead of O(N²).
-    """
-    n = len(t)
-    for i in range(1, n):
-        decay[i] = _exp_negative(np.abs(t[i] - t[i - 1]) / length)
-    p = q = 0.0
-    k00, k01, k11 = w[0] * w[0], w[0] * w[0] * t[0], w[0] * w[0] * t[0] * t[0]
-    for i in range(1, n):
-        wt = w[i] * t[i]
-        before = decay[i] * w[i - 1]
-        p, q = decay[i] * p + before, decay[i] * q + before * t[i - 1]
-        k00 += w[i] * (w[i] + 2 * p)
-        k01 += wt * (w[i] + p) + w[i] * q
-        k11 += wt * (wt + 2 * q)
-    return k00, k01, k11
-
-
-@inlined
-def _exp_negative(x: float) -> float:
-    """exp(-x) for x >= 0, to 1e-11: a loop of it vectorises.
-
-    Taylor's polynomial of exp(-y), y = x / 64 < 1/2, to the power of 64.
-    """
-    y = min(x, 30.0) / 64
-    z = 1 - y * (1 - y / 2 * (1 - y / 3 * (1 - y / 4 * (1 - y / 5 * (1 - y / 6 * (1 - y / 7))))))
-    z *= z
-    z *= z
-    z *= z
-    z *= z
-    z *= z
-    return z * z

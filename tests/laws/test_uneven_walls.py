@@ -7,7 +7,7 @@ import pytest
 
 from lidarcore import FITTERS, ExtractionSettings, SensorNoise, extract
 from lidarcore.geometry import squared_mahalanobis
-from lidarcore.lines.covariance import resampled_sums, unevenness_sums
+from lidarcore.lines.unevenness import resampled_sums, unevenness_sums
 from lidarcore.simulation import SimulatedSensor, World
 
 NOISE = SensorNoise(0.002, 0.001, range_growth=3e-4, unevenness=0.004, unevenness_length=0.08)
