@@ -28,6 +28,9 @@ class Selection:
     landmark: int | None = None
 
 
+NOTHING_SELECTED = Selection()
+
+
 @dataclass(frozen=True, eq=False)
 class Frame:
     """Features of one scan by every method asked for, the main one first, under one set of settings.
@@ -41,8 +44,8 @@ class Frame:
     settings: Settings
     features: dict[str, Features]
     corners: tuple[CornerRow, ...]
-    selection: Selection
     extract_us: float
+    selection: Selection = NOTHING_SELECTED
     clusters: Clusters | None = None
     localization: Localization | None = None
     paths: Paths = NO_PATHS

@@ -2,8 +2,7 @@
 
 import threading
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
@@ -17,7 +16,7 @@ from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import WallTable
 
 from ..errors import ConflictError
-from ..sources.odometry_feed import OdometryFeed, OdometryStatus
+from ..sources.odometry_feed import OdometryFeed
 from ..sources.timed_scan import TimedScan
 from .map_store import MapStore
 from .settings import LiveNavigation, Method, Settings
@@ -34,24 +33,6 @@ NOT_MOVED = (
     'To place the sensor, set navigation.method to "landmarks".'
 )
 NOT_LOCALIZED = "Nothing is localized: set navigation.mode to slam or localize."
-
-
-@dataclass(frozen=True, slots=True)
-class LocalizationStatus:
-    """`session` is built or localized in; `map` was chosen to localize in, null for the newest; `method`: by what.
-
-    A choice that was localized in ends when SLAM begins another map, that of a map which is deleted with mode off. SLAM
-    goes by the method that is chosen, a known map by what it holds: null before the first scan in it.
-    `extent` is that of the grid that is localized in, if it is one: from and to along x, then along y, m.
-    """
-
-    mode: Literal["off", "localize", "slam"]
-    method: Method | None
-    session: int | None
-    map: int | None
-    extent: Extent | None
-    problem: str | None
-    odometry: OdometryStatus
 
 
 class Navigation:

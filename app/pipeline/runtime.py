@@ -4,17 +4,14 @@ import gc
 import logging
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
 from numpy.typing import ArrayLike
 
-from lidarcore import SensorNoise, Tracker, compare, localization, warm_up
-from lidarcore.body_mask import Sector, masked, suggest_mask
-from lidarcore.clusters import cluster
-from lidarcore.evaluation.calibration.noise_check import NoiseCheck
+from lidarcore import SensorNoise, localization, warm_up
+from lidarcore.body_mask import Sector, suggest_mask
 from lidarcore.threads import FailureLog, join
 
 from ..errors import NotFoundError, NotYetError
@@ -22,17 +19,15 @@ from ..sources.player import Player
 from ..sources.source import Source
 from ..sources.timed_scan import TimedScan
 from .frame import Frame, Selection
-from .navigation import NOT_LOCALIZED, LocalizationStatus, Navigation
+from .frame_maker import FrameMaker
+from .localization_status import LocalizationStatus, status_of
+from .navigation import Navigation
 from .newest import NewestScan
 from .sensor_setups import SensorSetup, SensorSetups
-from .settings import Method, Settings
+from .settings import Settings
 
 logger = logging.getLogger(__name__)
 
-
-# scans, a minute of an S1: how long a corner that is hidden keeps its id while the sensor stands
-DORMANT = 600
-PAUSE = 2.0  # s without another scan, after which they have no rate
 END_WITHIN = 5.0  # s that the worker may take for the scan at hand
 
 
@@ -63,11 +58,8 @@ class Runtime:
         self._newest = NewestScan()
         self.player = Player(source, self._newest.put, lambda: self._newest.idle, self.announce)
         navigation.map_listeners.append(self._show_map)
-        self._tracker, self._source = Tracker(dormant=DORMANT), 0
-        self._times: deque[float] = deque(maxlen=20)
-        self._sequence = 0
+        self._frames = FrameMaker(navigation)
         self._told: tuple[object, ...] = ()  # of the run that goes on
-        self._noise_check = NoiseCheck()
         self._processing = FailureLog("scan %s could not be processed")
         self._lock = threading.Lock()
         self._worker = threading.Thread(target=self._work, name="worker", daemon=True)
@@ -120,29 +112,7 @@ class Runtime:
 
     def localization(self) -> LocalizationStatus:
         """What is localized, and in which map."""
-        return LocalizationStatus(
-            mode=self.settings.navigation.mode,
-            method=self._method(),
-            session=self.navigation.session,
-            map=self.navigation.map,
-            extent=self.navigation.extent,
-            problem=self.navigation.problem,
-            odometry=self.navigation.odometry.status(self._why_not_fed()),
-        )
-
-    def _method(self) -> Method | None:
-        """What tells the pose: SLAM goes by what is chosen, a known map by what it holds, told by its first scan."""
-        wanted = self.settings.navigation
-        by_mode = {"off": None, "slam": wanted.method, "localize": self.navigation.method}
-        return by_mode[wanted.mode]
-
-    def _why_not_fed(self) -> str | None:
-        """Why the newest scan takes no odometry from outside, if so."""
-        if self.settings.navigation.mode == "off":
-            return NOT_LOCALIZED
-        if self.frame and self.frame.timed.scan.odometry is not None:
-            return "The source has odometry of its own."
-        return None
+        return status_of(self.navigation, self.settings.navigation, self.frame)
 
     def feed(self, stamp: float, T_odom_sensor: ArrayLike) -> bool:
         """Odometry from outside; False if too much comes. Raises MotionError if the clock or the pose jumped."""
@@ -194,38 +164,8 @@ class Runtime:
             self.player.wake()
 
     def _process(self, timed: TimedScan) -> Frame:
-        settings = self.settings
-        timed = replace(timed, scan=masked(timed.scan, settings.sensor.mask or ()))
-        if timed.source != self._source:
-            self._source = timed.source
-            self._tracker.forget()
-        scan = self.navigation.deskewed(timed, settings)
-        begin = time.perf_counter()
-        features = compare(scan, settings.extraction, settings.methods)
-        extract_end = time.perf_counter()
-        clusters = cluster(scan, settings.clusters) if settings.clustered else None
-        cluster_end = time.perf_counter()
-        main = next(iter(features.values()))
-        localization = self.navigation.step(timed, scan, main, clusters, settings.landmark_method)
-        self._sequence += 1
-        return Frame(
-            sequence=self._sequence,
-            timed=timed,
-            scan=scan,
-            settings=settings,
-            features=features,
-            corners=self._tracker.rows(features),
-            selection=self.selection,
-            extract_us=1e6 * (extract_end - begin),
-            clusters=clusters,
-            localization=localization,
-            paths=self.navigation.paths,
-            picture=self.navigation.picture,
-            cluster_us=1e6 * (cluster_end - extract_end),
-            rate_hz=self._rate(timed),
-            noise_remark=self._noise_check.observe(main, timed.source),
-            dropped=self._newest.dropped,
-        )
+        frame = self._frames.frame(timed, self.settings, self.frame)
+        return replace(frame, selection=self.selection, dropped=self._newest.dropped)
 
     def _publish(self, frame: Frame) -> None:
         begin = time.perf_counter()
@@ -240,16 +180,6 @@ class Runtime:
         if (now := (run.runs, run.session, run.method, run.problem)) != self._told:
             self._told = now
             self.announce()
-
-    def _rate(self, timed: TimedScan) -> float:
-        """Scans per second over the last ones; 0 after a pause. One that is shown again is not another one."""
-        now = time.monotonic()
-        if self._times and now - self._times[-1] > PAUSE:
-            self._times.clear()
-        if self.frame is None or not timed.is_same(self.frame.timed):
-            self._times.append(now)
-        span = now - self._times[0] if self._times else 0.0
-        return (len(self._times) - 1) / span if span else 0.0
 
 
 def _setup(settings: Settings) -> SensorSetup:

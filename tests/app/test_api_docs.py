@@ -9,7 +9,7 @@ from lidarcore_app.jobs.profiles import Profile, ProfileEntry
 from lidarcore_app.jobs.recorder import RecorderStatus
 from lidarcore_app.jobs.studies.runner import StudyStatus
 from lidarcore_app.pipeline.frame import Selection
-from lidarcore_app.pipeline.navigation import LocalizationStatus
+from lidarcore_app.pipeline.localization_status import LocalizationStatus
 from lidarcore_app.pipeline.settings import Settings
 from lidarcore_app.sources.library import RecordingEntry
 from lidarcore_app.sources.player import SourceStatus

@@ -10,13 +10,8 @@ from starlette.responses import Response
 from typing_extensions import TypedDict
 
 from ...errors import NO_BODY, NotFoundError, NotYetError
-from ...pipeline.navigation import (
-    NOT_LOCALIZED,
-    SIGMA_HEADING,
-    SIGMA_POSITION,
-    LocalizationStatus,
-    Navigation,
-)
+from ...pipeline.localization_status import LocalizationStatus
+from ...pipeline.navigation import NOT_LOCALIZED, SIGMA_HEADING, SIGMA_POSITION, Navigation
 from ...pipeline.runtime import Runtime
 from ...pipeline.slam_run import Localization
 from ...pipeline.tables import csv_text
