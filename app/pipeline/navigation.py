@@ -1,7 +1,7 @@
 """Where the sensor is, from scan to scan: the navigator of the current run, what feeds it and what it leaves behind."""
 
 import threading
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import replace
 
 from numpy.typing import ArrayLike
@@ -10,23 +10,21 @@ from lidarcore import Array, Features, Scan
 from lidarcore.clusters import Clusters
 from lidarcore.errors import LandmarkMapError, UnknownSessionError
 from lidarcore.geometry import check_covariance
-from lidarcore.localization import Navigator, as_pose
+from lidarcore.localization import as_pose
 from lidarcore.mapping import MapPicture, WholeScans
-from lidarcore.mapping.grid import OccupancyGrid
-from lidarcore.mapping.walls import WallTable
 
 from ..errors import ConflictError
 from ..sources.odometry_feed import OdometryFeed
 from ..sources.timed_scan import TimedScan
 from .map_store import MapStore
+from .new_run import building, localizing
 from .settings import LiveNavigation, Method, Settings
 from .slam_run import Localization, Run
-from .trails import NO_PATHS, Paths, TrackedPose, Trails
+from .trails import NO_PATHS, Paths, TrackedPose
 
 SIGMA_POSITION, SIGMA_HEADING = 0.2, 0.15  # m, rad: of a pose that someone points out on a map
 Extent = tuple[tuple[float, float], tuple[float, float]]
 
-NO_MAP = "There is no map to localize in: build one by SLAM, or load one."
 GONE = "There is no session {} any more: choose another map, or build one by SLAM."
 NOT_MOVED = (
     "A map of whole scans begins where its first scan was taken: POST /localization/reset starts a new map. "
@@ -187,14 +185,10 @@ class Navigation:
         is_over = self._is_map_used if wanted.mode == "slam" else wanted.mode == "off" and self._is_map_gone
         if is_over:
             self.choose_map(None)  # what is built now is meant next, or the newest
-        replay = (timed.name, wanted) if timed.position.kind == "recording" else None
-        if wanted.mode == "slam" and wanted.method == "scans":
-            navigator = WholeScans(settings.extraction, lambda: self._begin_walls(timed.name, replay))
-            self._run = Run(timed.source, wanted, navigator, None, None, Trails(own_frame=True))
-            self._placed = None
-        elif wanted.mode == "slam":
-            written = self._store.begin(timed.name, replay=replay)
-            self._run = Run(timed.source, wanted, Navigator(wanted), written, None, Trails(own_frame=True))
+        if wanted.mode == "slam":
+            self._run = building(self._store, timed, settings, self._tell_of_walls)
+            if wanted.method == "scans":
+                self._placed = None
         elif wanted.mode == "localize":
             self._run = self._localizing(timed, settings)
         else:
@@ -205,45 +199,20 @@ class Navigation:
             self._placed = None
         return self._run
 
-    def _begin_walls(self, source: str, replay: Hashable) -> Callable[[OccupancyGrid, WallTable], None]:
-        """Where grid and walls go whenever they are other ones."""
-        run = self._store.begin_walls(source, replay=replay)
-
-        def keep(grid: OccupancyGrid, walls: WallTable) -> None:
-            run.put(grid, walls)
-            for listener in self.map_listeners:
-                listener()
-
-        return keep
-
     def _localizing(self, timed: TimedScan, settings: Settings) -> Run | None:
         self._store.settle()
         session = self._map if self._map is not None else self._store.newest()
         self._is_map_used = True
         self._store.use(session)
-        if session is None:
-            self.problem = NO_MAP
-            return None
         try:
-            navigator = self._navigator_in(session, settings)
-            # The truth of a recording has a frame of its own, whatever map is used.
-            own_frame = self._store.is_built(session) or timed.position.kind == "recording"
+            return localizing(self._store, session, timed, settings)
         except UnknownSessionError:  # deleted meanwhile
             self._is_map_gone = True
             self.problem = GONE.format(session)
-            return None
         except LandmarkMapError as error:
             self.problem = str(error)
-            return None
-        if navigator is None:
-            self.problem = NO_MAP
-            return None
-        return Run(timed.source, settings.navigation, navigator, None, session, Trails(own_frame))
+        return None
 
-    def _navigator_in(self, session: int, settings: Settings) -> Navigator | WholeScans | None:
-        """What localizes in the map of a session: whole scans if it has a grid, else landmarks, if there are any."""
-        if (grid := self._store.grid(session)) is not None:
-            walls = self._store.walls(session)
-            return WholeScans(settings.extraction, known=MapPicture(grid, walls if len(walls) else None))
-        known = self._store.landmarks(session)
-        return Navigator(settings.navigation, known) if known else None
+    def _tell_of_walls(self) -> None:
+        for listener in self.map_listeners:
+            listener()
