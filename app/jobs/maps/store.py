@@ -2,13 +2,11 @@
 
 import time
 from collections.abc import Callable, Hashable
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import NamedTuple
 
-from lidarcore.errors import MapFileError, UnknownSessionError
+from lidarcore.errors import MapFileError
 from lidarcore.landmarks import LandmarkMap, Session
 from lidarcore.localization import Landmarks
 from lidarcore.localization import from_stored as landmarks_from_stored
@@ -16,6 +14,7 @@ from lidarcore.mapping.grid import OccupancyGrid
 from lidarcore.mapping.walls import JointWalls, WallTable, unpack_covariance
 
 from .landmark_writer import LandmarkWriter
+from .repeats import Repeats
 from .sent_map import building_of, landmarks_of
 from .session_writer import MapChange, SessionWriter
 from .wall_writer import (
@@ -30,7 +29,6 @@ from .watched_atlas import WatchedAtlas
 from .write_queue import WriteQueue
 
 PATIENCE = 2.0  # s to wait while another process writes
-SLACK = 0.1  # of what a map saw, by which another one of the same may have seen less
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,18 +45,6 @@ class StoreStatus:
     error: str | None
 
 
-class Span(NamedTuple):
-    """From when to when a map saw something, s, by the clock of what it is of."""
-
-    first: float
-    last: float
-
-    def covers(self, other: "Span") -> bool:
-        """Whether it holds the other one, but for a little at the ends."""
-        little = SLACK * (other.last - other.first)
-        return self.first <= other.first + little and self.last >= other.last - little
-
-
 class LandmarkStore:
     """An atlas of maps, with a thread that writes the running one.
 
@@ -72,9 +58,8 @@ class LandmarkStore:
         self._run: SessionWriter | None = None
         self._used: int | None = None
         self._unpacking = Lock()  # for one map at a time: with many walls it takes 200 MB
-        # By what is replayed, the sessions of its finished maps, and from when to when they saw something.
-        self._finished: dict[Hashable, dict[int, Span]] = {}
-        self._queue = WriteQueue(self._tell, self._replace_earlier)
+        repeats = Repeats(self.atlas, lambda session: session == self._used)
+        self._queue = WriteQueue(self._tell, repeats.replace_earlier)
 
     def close(self) -> None:
         """End the run, wait (bounded) until it is written, and close the file."""
@@ -193,32 +178,6 @@ class LandmarkStore:
         """The newest session to localize in."""
         return self.atlas.newest_to_localize_in()
 
-    def _replace_earlier(self, run: SessionWriter) -> None:
-        """Give up the maps of earlier runs with the same `replay` that saw no more of it.
-
-        Those that are in use are kept, and those that somebody has named.
-        """
-        if run.replay is None or run.session is None:
-            return
-        try:
-            seen = _span(self.atlas[run.session])
-        except UnknownSessionError:  # somebody else gave it up
-            return
-        finished = self._finished.setdefault(run.replay, {})
-        covered = [session for session, span in finished.items() if seen.covers(span)]
-        finished[run.session] = seen
-        for earlier in covered:
-            if earlier < run.session and earlier != self._used:
-                del finished[earlier]
-                with suppress(UnknownSessionError):
-                    if not self.atlas.session(earlier).name:
-                        self.atlas.delete(earlier)
-
     def _tell(self, change: MapChange) -> None:
         for listener in self.listeners:
             listener(change)
-
-
-def _span(map: LandmarkMap) -> Span:
-    seen = [(mark.first_seen, mark.last_seen) for mark in [*map, *map.walls()]]
-    return Span(min((first for first, _ in seen), default=0.0), max((last for _, last in seen), default=0.0))
