@@ -11,7 +11,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from lidarcore import LidarError, SensorNoise, files
 
 from ..errors import ConflictError, InvalidNameError, NotFoundError, explained, storing
-from ..sources.library import PLAIN_NAME, checked_name
+from ..sources.plain_names import PLAIN_NAME, checked_name
 
 SUFFIX = ".json"
 MAX_BYTES = 1 << 16

@@ -1,6 +1,5 @@
 """The folder of recordings: what is in it, and how something gets in and out. Nothing is written outside."""
 
-import re
 import shutil
 import tempfile
 import time
@@ -12,7 +11,8 @@ from pathlib import Path
 
 import anyio
 
-from ..errors import ConflictError, InvalidNameError, NotFoundError, TooLargeError, storing
+from ..errors import ConflictError, NotFoundError, TooLargeError, storing
+from .plain_names import checked_name, is_plain
 from .recorded import check_readable
 from .recording_facts import RecordingFacts, facts
 from .trash import PREFIX as TRASHED
@@ -24,12 +24,6 @@ BUILTIN = (_DEMO / "emulated-s1.mcap", _DEMO / "real-rplidar-windsor.npz")
 UPLOADING = ".upload-"  # begins the names of folders in which uploads arrive
 ABANDONED = 3600.0  # s without a change after which such a folder belongs to a server that was killed
 BAG_FILES = (".db3", ".mcap")  # what makes a folder a ROS 2 bag
-# A file name on every system, and what to do about another one.
-PLAIN_NAME = re.compile(r"(?!\.)[^/\\:*?\"<>|\x00-\x1f\x7f\ud800-\udfff]{1,200}(?<![. ])")
-PLAINLY = (
-    'leave out / \\ : * ? " < > | and control characters, a dot in front and a dot or blank at the end; '
-    "200 bytes at most"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,25 +195,14 @@ class Library:
             raise TooLargeError(f"The recording is larger than the {self.max_bytes} bytes allowed.")
 
 
-def checked_name(name: str) -> str:
-    """The name, if it is a plain file name. Raises InvalidNameError otherwise."""
-    if not _is_plain(name):
-        raise InvalidNameError(f"{name!r} is not a plain file name: {PLAINLY}.")
-    return name
-
-
-def _is_plain(name: str) -> bool:
-    return bool(PLAIN_NAME.fullmatch(name)) and len(name.encode()) <= 200
-
-
 def _is_candidate(path: Path) -> bool:
     """True for files and bags whose names can be asked for. Raises OSError if it cannot be looked at."""
-    return _is_plain(path.name) and _is_file_or_bag(path)
+    return is_plain(path.name) and _is_file_or_bag(path)
 
 
 def _is_misnamed(path: Path) -> bool:
     with suppress(OSError):
-        return not (path.name.startswith(".") or _is_plain(path.name)) and _is_file_or_bag(path)
+        return not (path.name.startswith(".") or is_plain(path.name)) and _is_file_or_bag(path)
     return False
 
 
