@@ -22,12 +22,12 @@ from ...jobs.maps.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
 from ..dependencies import Server
 from ..downloads import text_file
+from ..map_queries import USUAL, Limit, Metres, Region
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
 from ..wall_json import WallJson, wall_rows
 from .grid import asked_session, running_walls
-from .landmarks import USUAL, Limit, Metres, Region
 
 Mask = NDArray[np.bool_]
 
