@@ -32,6 +32,7 @@ from .routes import (
     settings,
     source,
     studies,
+    wall_history,
     walls,
 )
 from .security import Guard
@@ -39,8 +40,8 @@ from .state import ServerOptions, State
 
 API = "/api/v1"
 ROUTES = (
-    frame, measure, localization, walls, grid, landmarks, map_making, map, sessions, repeatability, calibration,
-    studies, settings, source, sensor, recordings, recorder, selection, meta,
+    frame, measure, localization, walls, wall_history, grid, landmarks, map_making, map, sessions, repeatability,
+    calibration, studies, settings, source, sensor, recordings, recorder, selection, meta,
 )  # fmt: skip
 PAGES = {"/": "index.html", "/studies": "studies.html", "/guide": "guide.html", "/docs": "docs.html"}
 _APP = Path(__file__).parents[1]

@@ -26,7 +26,8 @@ from lidarcore_app.web.routes.sensor import FoundDeviceJson, SuggestionJson
 from lidarcore_app.web.routes.sessions import SessionsJson
 from lidarcore_app.web.routes.source import SimulationJson
 from lidarcore_app.web.routes.studies import StudiesJson
-from lidarcore_app.web.routes.walls import WallHistoryJson, WallsJson
+from lidarcore_app.web.routes.wall_history import WallHistoryJson
+from lidarcore_app.web.routes.walls import WallsJson
 from lidarcore_app.web.schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
 from pydantic import TypeAdapter
 from serving import Json, Server, strict_json

@@ -10,19 +10,14 @@ from numpy.typing import NDArray
 from starlette.responses import Response
 from typing_extensions import TypedDict
 
-from lidarcore.errors import UnknownWallError
 from lidarcore.landmarks import Box, Circle
 from lidarcore.mapping.export import walls_csv, walls_geojson
 from lidarcore.mapping.walls import WallTable, along, distances, in_box, nearest
 
-from ...errors import NotFoundError
 from ...jobs.maps.names import stem_of
-from ...jobs.maps.store import LandmarkStore
-from ...jobs.maps.wall_writer import from_stored
-from ...pipeline.runtime import Runtime
 from ..dependencies import Server
 from ..downloads import text_file
-from ..map_queries import USUAL, Limit, Metres, Region
+from ..map_queries import Metres, Region
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Finite
@@ -33,8 +28,6 @@ Mask = NDArray[np.bool_]
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422, 503))
 
-NO_SESSION = "No map is kept yet: wait for further scans, or give the session of one that is kept."
-
 TOLERANCE = 0.1  # rad that a direction may be off, if nobody says
 
 CSV = "id,alpha_rad,r_m,x1_m,y1_m,x2_m,y2_m,length_m,..."
@@ -42,18 +35,6 @@ CSV = "id,alpha_rad,r_m,x1_m,y1_m,x2_m,y2_m,length_m,..."
 
 class WallsJson(TypedDict):
     walls: list[WallJson]
-
-
-class WallHistoryJson(TypedDict):
-    """`wall` is null if it is no longer in the map: its last state is the last of the history.
-
-    `session` is null, and the history empty, of a wall of the running map before anything of it is kept.
-    """
-
-    session: int | None
-    wall: WallJson | None
-    history: list[WallJson]
-    next: float | None
 
 
 class NearestWallsJson(TypedDict):
@@ -163,59 +144,6 @@ def nearest_walls(
     wanted, far = which(asked), distances(asked, (x, y))
     chosen = [i for i in nearest(asked, (x, y), len(asked)).tolist() if wanted[i]][:k]
     return encode({"walls": wall_rows(asked, chosen), "distances": far[chosen].tolist()})
-
-
-@router.get(
-    "/walls/{id}/history",
-    response_model=WallHistoryJson,
-    response_description="The wall",
-)
-def history(
-    server: Server,
-    id: int,
-    after: Annotated[Finite, Query(description="s: `next` of the page before")] = -math.inf,
-    limit: Limit = USUAL,
-    session: Annotated[
-        int | None, Query(description="which map; if not given the one that is written or used")
-    ] = None,
-) -> Response:
-    """One wall of a map that is kept, and what it was in each second in which it was seen, the oldest first.
-
-    So also of one that became part of another. It begins when three keyframes have seen the wall; of a wall of the
-    running map it is empty until then.
-    """
-    kept = server.landmarks.session if session is None else session
-    try:
-        return encode(_kept_history(server.landmarks, kept, id, after, limit))
-    except (NotFoundError, UnknownWallError):
-        wall = _running_wall(server.runtime, id) if session is None else None
-        if wall is None:
-            raise
-        return encode({"session": kept, "wall": wall, "history": [], "next": None})
-
-
-def _kept_history(
-    landmarks: LandmarkStore, session: int | None, id: int, after: float, limit: int
-) -> WallHistoryJson:
-    if session is None:
-        raise NotFoundError(NO_SESSION)
-    wall_map = landmarks.atlas[session]
-    found = from_stored(wall_map.wall_history(id, after, limit))
-    present = from_stored([wall for wall in wall_map.walls() if wall.id == id])
-    return {
-        "session": session,
-        "wall": next(iter(wall_rows(present, range(len(present)))), None),
-        "history": wall_rows(found, range(len(found))),
-        "next": float(found.last_seen[-1]) if len(found) == limit else None,
-    }
-
-
-def _running_wall(runtime: Runtime, id: int) -> WallJson | None:
-    """A wall of the map that SLAM makes now."""
-    picture = runtime.navigation.picture
-    if picture is None or picture.walls is None:
-        return None
-    return next(iter(wall_rows(picture.walls, np.flatnonzero(picture.walls.ids == id).tolist())), None)
 
 
 def _within(walls: WallTable, region: Box | Circle | None) -> Mask:
