@@ -10,8 +10,9 @@ with Driver() as driver:
 from lidarcore.rplidar.capture import CaptureWriter, Direction, Piece, Stream
 from lidarcore.rplidar.connection.devices import FoundDevice, find_devices
 from lidarcore.rplidar.connection.port import Tap, path_of
+from lidarcore.rplidar.connection.scan_options import BAUD, check_scan_options
 from lidarcore.rplidar.connection.statistics import Statistics
-from lidarcore.rplidar.driver import BAUD, Driver, State, check_scan_options
+from lidarcore.rplidar.driver import Driver, State
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.rplidar.protocol import DeviceInfo, Health, Revolution, ScanMode
 

@@ -16,21 +16,18 @@ from lidarcore.closing import Closing
 from lidarcore.errors import DeviceError, NoAnswerError
 from lidarcore.rplidar.connection.devices import find_other_baud, only_device
 from lidarcore.rplidar.connection.exit_handlers import close_at_exit, forget_at_exit
-from lidarcore.rplidar.connection.handshake import choose_mode
 from lidarcore.rplidar.connection.latest import Latest
 from lidarcore.rplidar.connection.port import Cancelled, ListPorts, Tap
 from lidarcore.rplidar.connection.reconnection import find_again
-from lidarcore.rplidar.connection.session import ScanOptions, Session
+from lidarcore.rplidar.connection.scan_options import BAUD, ScanOptions, checked_rpm
+from lidarcore.rplidar.connection.session import Session
 from lidarcore.rplidar.connection.statistics import Statistics, Tally
-from lidarcore.rplidar.protocol import S1_MODES, DeviceInfo, Health, Revolution, ScanMode
+from lidarcore.rplidar.protocol import DeviceInfo, Health, Revolution, ScanMode
 from lidarcore.scan import Scan
 from lidarcore.threads import join
 
 State = Literal["connecting", "streaming", "stalled", "reconnecting", "closed"]
 
-BAUD = 256_000  # of an S1
-RPM = 600
-SPEEDS = (480, 900)  # rpm
 KEPT = 10  # revolutions
 CLOSING = 3.0  # s
 
@@ -74,7 +71,7 @@ class Driver(Closing):
         list_ports: ListPorts = comports,
     ) -> None:
         self._port = port
-        self._options = ScanOptions(baud, mode, _checked(RPM if rpm is None else rpm))
+        self._options = ScanOptions(baud, mode, checked_rpm(rpm))
         self._reconnects = reconnect
         self._tap = tap
         self._on_change = on_change
@@ -123,7 +120,7 @@ class Driver(Closing):
 
     def set_speed(self, rpm: int) -> None:
         """Turn at that speed from now on, 480 to 900 rpm. Raises DeviceError for others."""
-        self._options = replace(self._options, rpm=_checked(rpm))
+        self._options = replace(self._options, rpm=checked_rpm(rpm))
         self._session.set_speed(rpm)
 
     @property
@@ -244,16 +241,3 @@ class Driver(Closing):
         self._state, self._error = state, error
         if self._on_change:
             self._on_change()
-
-
-def check_scan_options(mode: str | None, rpm: int | None) -> None:
-    """Raises DeviceError for a mode or speed that no S1 has, not even an emulated one; None leaves the choice to it."""
-    choose_mode(S1_MODES, None, mode)
-    _checked(RPM if rpm is None else rpm)
-
-
-def _checked(rpm: int) -> int:
-    slowest, fastest = SPEEDS
-    if not slowest <= rpm <= fastest:
-        raise DeviceError(f"The sensor cannot turn at {rpm} rpm: choose {slowest} to {fastest}.")
-    return rpm

@@ -16,8 +16,7 @@ from serial import Serial
 from waiting import soonest, wait_until
 
 from lidarcore.errors import DeviceError, NoAnswerError, NoDeviceError, PortBusyError
-from lidarcore.rplidar import Driver
-from lidarcore.rplidar.driver import check_scan_options
+from lidarcore.rplidar import Driver, check_scan_options
 from lidarcore.rplidar.emulator_process import EmulatorProcess
 from lidarcore.rplidar.protocol import S1_MODES, StreamDecoder
 

@@ -3,25 +3,16 @@
 import threading
 import time
 from contextlib import suppress
-from dataclasses import dataclass
 
 from lidarcore.errors import DeviceError, NoAnswerError
 from lidarcore.rplidar.connection import handshake
 from lidarcore.rplidar.connection.port import Port, Tap
+from lidarcore.rplidar.connection.scan_options import ScanOptions
 from lidarcore.rplidar.protocol import Revolution, StreamDecoder
 
 STALL = 0.5  # s without measurements after which the stream counts as stalled
 LOST = 2.0  # s without measurements after which it is given up
 FIRST = 5.0  # s until the first measurements: the motor comes up to speed before
-
-
-@dataclass(frozen=True)
-class ScanOptions:
-    """What the user asked for: baud rate, scan mode (None: what the sensor recommends), speed in rpm."""
-
-    baud: int
-    mode: str | None
-    rpm: int
 
 
 class Session:
