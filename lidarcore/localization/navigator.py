@@ -16,7 +16,7 @@ from lidarcore.localization.divergence import DivergenceCheck
 from lidarcore.localization.ekf.estimate import Estimate, Instant, as_pose, no_innovation
 from lidarcore.localization.ekf.filters import Filter, find, is_recognisable, make_filter
 from lidarcore.localization.ekf.motion import start
-from lidarcore.localization.ekf.slam import Slam
+from lidarcore.localization.ekf.slam import ORIGIN, Slam
 from lidarcore.localization.landmarks import Landmarks
 from lidarcore.localization.map_origin import MapOrigin
 from lidarcore.localization.observations import Observations
@@ -34,7 +34,6 @@ from lidarcore.localization.tracking_result import (
 from lidarcore.localization.visibility import Visibility
 from lidarcore.scan import Scan
 
-_ORIGIN = 1e-6 * np.eye(3)
 _NOWHERE = np.diag([10.0, 10.0, np.pi]) ** 2  # m², m², rad²: covariance of a pose of which nothing is known
 _STRAY = 0.1  # m; if a gap may hide more of the way, landmarks could be taken for their neighbours
 _NOTHING = Landmarks.of(Points(np.empty((0, 2)), np.eye(2)))
@@ -88,7 +87,7 @@ class Navigator:
         self._strayed = False  # in a gap: which landmark is which is to be made sure of first
         self._distortion = Distortion()
         self._is_placed = pose is not None or len(self._given) == 0
-        nowhere = _ORIGIN if self._is_placed else _NOWHERE
+        nowhere = ORIGIN if self._is_placed else _NOWHERE
         self._set_start((0, 0, 0) if pose is None else pose, nowhere if covariance is None else covariance)
 
     @property
@@ -243,8 +242,8 @@ class Navigator:
         state = self._divergence.judge(self._estimate, running.is_at_odds)
         if state == "lost" and isinstance(running, Slam) and not is_recognisable(running):
             self._origin = MapOrigin(self._estimate.pose, self._origin.estimate(self._estimate).covariance)
-            running.start_over(self._estimate.pose, _ORIGIN)
-            self._estimate = replace(self._estimate, covariance=_ORIGIN)
+            running.start_over(self._estimate.pose, ORIGIN)
+            self._estimate = replace(self._estimate, covariance=ORIGIN)
             self._divergence.restart()
             self._state = "starting"
             return NEW_MAP

@@ -6,6 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.extraction import extract
+from lidarcore.localization.ekf.slam import ORIGIN
 from lidarcore.localization.navigator import Navigator
 from lidarcore.localization.points import Points
 from lidarcore.localization.settings import NavigationSettings
@@ -24,7 +25,7 @@ def warm_up() -> None:
         _run(Navigator(NavigationSettings(mode="localize"), built.landmarks), square, odometry)
     far = 100.0 + np.stack(np.meshgrid(np.arange(10.0), np.arange(20.0)), -1).reshape(-1, 2)
     large = Points(far, 1e-4 * np.eye(2))
-    _run(Navigator(NavigationSettings(mode="slam"), large, np.zeros(3), 1e-6 * np.eye(3)), square, None)
+    _run(Navigator(NavigationSettings(mode="slam"), large, np.zeros(3), ORIGIN), square, None)
 
 
 def _run(navigator: Navigator, scan: Scan, odometry: Array | None) -> Navigator:

@@ -9,12 +9,12 @@ from dataclasses import replace
 from lidarcore.errors import LidarError, UnknownLandmarkError, UnknownSessionError
 from lidarcore.threads import join
 
+from ..spooler import END_WITHIN
 from .session_writer import MapChange, SessionWriter, Waiting
 
 PAUSE = 0.25  # s between two transactions: how far the disk may be behind
 RETRY = 1.0  # s after one that failed
 MOST_RUNS = 8  # that have something waiting to be written
-END_WITHIN = 10.0  # s that a slow disk may take for what waits
 
 logger = logging.getLogger(__name__)
 

@@ -26,7 +26,7 @@ from lidarcore.localization.visibility import Costs
 Visible = Callable[[Array], Costs]
 """Which of the points (L, 2) m, sensor frame, should be seen if they are there: the trust they lose if they are not."""
 
-_ORIGIN = 1e-6 * np.eye(3)
+ORIGIN = 1e-6 * np.eye(3)  # m², m rad, rad²: covariance of the pose at which a map begins
 _ENOUGH = 3  # confirmed landmarks fix a pose and leave a check; with fewer, tentative ones have to help
 
 
@@ -51,13 +51,13 @@ class Slam:
         self.settings = settings or LocalizationSettings()
         self._motion = motion_model(self.settings, with_velocity=True)
         d = self._motion.size
-        self._unknown_velocity = start(np.zeros(3), _ORIGIN, self.settings, d)[1][3:, 3:]
+        self._unknown_velocity = start(np.zeros(3), ORIGIN, self.settings, d)[1][3:, 3:]
         self._joint, self._register = JointState(np.zeros(d), np.zeros((d, d))), Register(self.settings)
         if landmarks is not None and len(landmarks):
             self._joint.add(landmarks.points.xy, landmarks.points.covariance)
             self._register.add_known(landmarks)
         self._last: Instant | None = None
-        self.reset(pose, _ORIGIN if covariance is None else covariance)
+        self.reset(pose, ORIGIN if covariance is None else covariance)
 
     @property
     def landmarks(self) -> Points:
