@@ -9,8 +9,6 @@ from pydantic import Field, model_validator
 from lidarcore.fields import number, settings
 from lidarcore.localization.motion_noise import OdometryNoise, VelocityNoise
 
-__all__ = ["LocalizationSettings", "NavigationSettings", "OdometryNoise", "VelocityNoise"]
-
 
 @settings
 class LocalizationSettings:

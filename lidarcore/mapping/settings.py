@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.fields import number, settings, whole
-from lidarcore.localization.settings import OdometryNoise
+from lidarcore.localization.motion_noise import OdometryNoise
 from lidarcore.noise import SensorNoise
 
 VAGUE = 0.5

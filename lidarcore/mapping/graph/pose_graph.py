@@ -19,7 +19,7 @@ from lidarcore.mapping.graph.edges import edge_errors, linearise
 from lidarcore.mapping.graph.recovery import Recovery, factor
 
 _COOLING = 4.0  # by which doubts about new edges set in earlier from round to round
-_FIXED = 1e12  # information of the first pose
+FIXED = 1e12  # information of the first pose
 _HALVINGS = 12  # of a step that makes poses less likely
 _ROUNDING = 1e-9  # of what optimization makes smallest
 
@@ -189,7 +189,7 @@ class PoseGraph:
         chi2 = linearise(poses, self._ends, self._relatives, self._informations, doubts, blocks, b)
         index = (3 * self._ends[:, :, None] + np.arange(3)).reshape(-1, 6)
         row, column = np.broadcast_arrays(index[:, :, None], index[:, None, :])
-        entries = np.append(blocks.ravel(), [_FIXED] * 3)
+        entries = np.append(blocks.ravel(), [FIXED] * 3)
         places = np.append(row.ravel(), [0, 1, 2]), np.append(column.ravel(), [0, 1, 2])
         return csc_array((entries, places), shape=(len(b), len(b))), b, chi2
 

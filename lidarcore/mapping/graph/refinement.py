@@ -27,10 +27,10 @@ from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.mapping.graph.adjustment import NormalEquations, Surfaces, normal_equations, speeds_left
 from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
 from lidarcore.mapping.graph.known import Known
+from lidarcore.mapping.graph.pose_graph import FIXED
 from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.matching.patches import Patches
 
-_FIXED = 1e12  # information of the first pose
 _SETTLED = 0.01  # mean square of a step, in variances of the poses, below which it changes nothing
 _ALIKE = 0.03  # share by which a variance changes, below which it is the same
 _MEASURED = 4  # rounds after which noise is known so well that steps can be compared
@@ -190,7 +190,7 @@ def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> 
     np.add.at(g, index, np.einsum("nki,nkl,nl->ni", J, W, e))
     row, column = np.broadcast_arrays(index[:, :, None], index[:, None, :])
     fixed = np.zeros(len(g))
-    fixed[:3] = _FIXED
+    fixed[:3] = FIXED
     tied = csc_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=H.shape)
     return csc_array(H + tied + diags_array(fixed)), g
 

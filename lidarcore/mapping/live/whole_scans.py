@@ -22,7 +22,7 @@ from lidarcore.mapping.live.background import Background, Corrected, MapPicture
 from lidarcore.mapping.live.locate_worker import LocateWorker
 from lidarcore.mapping.live.map_worker import MapWorker
 from lidarcore.mapping.matching.front import FrontEnd
-from lidarcore.mapping.matching.sweep import elapsed
+from lidarcore.mapping.matching.sweep import PAUSE, elapsed
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import Walls
@@ -31,7 +31,6 @@ from lidarcore.settings import ExtractionSettings
 
 _NONE = Points(np.empty((0, 2)), np.eye(2))
 _NO_LANDMARKS = Landmarks.of(_NONE)
-_PAUSE = 1.0  # s between scans, over which the motion between them does not tell the velocity
 
 
 class WholeScans:
@@ -183,7 +182,7 @@ class WholeScans:
     def _move(self, scan: Scan, tracked: Tracked) -> None:
         """Remember how the sensor moved, which no bend of the map changes: the next scan is deskewed by that."""
         self._velocity = None
-        if self._before is not None and 0 < (dt := elapsed(scan, self._before)) <= _PAUSE:
+        if self._before is not None and 0 < (dt := elapsed(scan, self._before)) <= PAUSE:
             x, y, turn = (relative(self._tie.pose, tracked.tie.pose) / dt).tolist()
             self._velocity = x, turn, y
         self._before = scan.stamp
