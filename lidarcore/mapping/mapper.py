@@ -13,9 +13,10 @@ from lidarcore.mapping.graph.refinement import Refined
 from lidarcore.mapping.loops.back import BackEnd
 from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.keyframes import Keyframes
-from lidarcore.mapping.matching.distortion import half_time, own_variances, pose_shift
+from lidarcore.mapping.matching.distortion import own_variances, pose_shift
 from lidarcore.mapping.matching.front import FrontEnd
 from lidarcore.mapping.matching.motion_smoothing import UNTOLD, ScanMotion, smoothed, with_distortion
+from lidarcore.mapping.matching.sweep import half_time
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan

@@ -9,11 +9,11 @@ from mapping_scenes import NOISE
 from lidarcore import Scan
 from lidarcore.geometry import pose_difference
 from lidarcore.mapping import MatchSettings
-from lidarcore.mapping.matching.distortion import half_time, own_variances, pose_shift
+from lidarcore.mapping.matching.distortion import own_variances, pose_shift
 from lidarcore.mapping.matching.patches import joined, patches
 from lidarcore.mapping.matching.registration import register
 from lidarcore.mapping.matching.surfels import surfels
-from lidarcore.mapping.matching.sweep import without
+from lidarcore.mapping.matching.sweep import half_time, without
 from lidarcore.simulation import SimulatedSensor
 from lidarcore.simulation.rooms import box, rectangular_room
 from lidarcore.simulation.world import World

@@ -4,15 +4,10 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.mapping.matching.patches import Patches
-from lidarcore.mapping.matching.sweep import is_swept
+from lidarcore.mapping.matching.sweep import half_time, is_swept
 from lidarcore.scan import Scan
 
 _PRIOR = np.diag([1.0, 1.0, 1.0])  # 1/m², 1/rad²: patches that do not tell a pose shift nothing
-
-
-def half_time(scan: Scan) -> float:
-    """Mean time (s) of a scan's beams after its stamp; 0 if it is not known."""
-    return float(np.mean(scan.beam_times)) if scan.beam_times is not None and is_swept(scan) else 0.0
 
 
 def pose_shift(scan: Scan, seen: Patches) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
-from lidarcore.geometry import HERE, UncertainPose, relative
+from lidarcore.geometry import HERE, UncertainPose
 from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
 from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.prediction import Prediction
@@ -106,8 +106,7 @@ class FrontEnd:
         seen = patches(scan, self._settings.match)
         registered = self._map.registered(scan, seen, guess)
         if registered.inliers >= SURE and dt > 0:
-            found = relative(self._known.pose, self._map.tie(registered).pose) / dt
-            corrected = self._sweep.correct(scan, found, dt)
+            corrected = self._sweep.correct(scan, self._known.pose, self._map.tie(registered).pose, dt)
             if corrected is not scan:
                 scan, seen = corrected, patches(corrected, self._settings.match)
                 registered = self._map.registered_again(seen, guess, registered.pose)
@@ -154,7 +153,7 @@ class FrontEnd:
         self._begin_anew(straight)
         if straight is not first:
             self._prediction.begin_at(dt * straight.velocity)
-            self._sweep.begin(straight.velocity)
+            self._sweep.begin(straight.scan, straight.velocity)
         return straight
 
     def _begin_anew(self, first: Tracked) -> None:
