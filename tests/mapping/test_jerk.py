@@ -6,7 +6,7 @@ from jerky_motions import motions, only
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
-from lidarcore.mapping.matching.jerk import JERKS, PAIRS, Drive, _most_likely, estimated, window
+from lidarcore.mapping.matching.jerk import DENSITIES, JERKS, STEADY, Drive, _most_likely, estimated, window
 from lidarcore.mapping.matching.jerk_fits import evidences
 from lidarcore.mapping.matching.motion_smoothing import UNTOLD
 
@@ -108,7 +108,7 @@ def test_the_claims_hold_for_motions_whose_jerkiness_nobody_told():
     told = around(places[order])
     drive = Drive.of(told)
     assert drive.noise == 0.25
-    of_three = np.isclose(PAIRS[:, :, 0], 3.0)
+    of_three = np.isclose(DENSITIES[:, :2, 0], 3.0)
     assert all(drive.shares[which, 0].sum() > 0.2 for which in of_three.T)
     rates, C, _ = estimated(told, drive)
     off = rates[:, :, 0] - np.stack([v, a], -1)[order]
@@ -124,8 +124,7 @@ def test_no_other_shares_of_jerks_explain_places_better():
     places[:, :, 0] = y - y[:, 3:4] + rng.normal(0, SIGMA[0], y.shape)
     given, some = around(places), np.arange(120)
     found = np.empty((len(JERKS), 120, 3))
-    alike = np.stack([JERKS, JERKS], 1)
-    evidences(given, some, 1.0, alike, found)
+    evidences(given, some, 1.0, STEADY, found)
     likelihoods = np.exp(found[:, :, 0])
     solved = minimize(
         lambda shares: -np.log(shares @ likelihoods).mean(),
@@ -133,7 +132,7 @@ def test_no_other_shares_of_jerks_explain_places_better():
         bounds=[(1e-9, 1)] * len(JERKS),
         constraints={"type": "eq", "fun": lambda shares: shares.sum() - 1},
     )
-    shares = _most_likely(given, some, 1.0, alike)[1][:, 0]
+    shares = _most_likely(given, some, 1.0, STEADY)[1][:, 0]
     assert solved.success
     assert shares.sum() == pytest.approx(1)
     assert -np.log(shares @ likelihoods).mean() - solved.fun < 0.003

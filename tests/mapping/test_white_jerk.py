@@ -5,7 +5,7 @@ import pytest
 from jerky_motions import motions, only
 
 from lidarcore.mapping.matching.jerk import JERKS, estimated, window
-from lidarcore.mapping.matching.white_jerk import wander
+from lidarcore.mapping.matching.white_jerk import STRETCHES, wander
 
 H = 0.05  # s, half a sweep
 T = np.array([-0.11, 0.0, 0.1, 0.2])
@@ -27,12 +27,13 @@ def shown(place):
 
 
 def test_covariances_add_up_what_impulses_one_by_one_do():
-    near, far = np.empty((2, 1, 6, 6))
-    wander(T[None], np.array([H]), near, far)
+    covariances = np.empty((1, STRETCHES, 6, 6))
+    wander(T[None], np.array([H]), covariances)
     times = (np.arange(-300, 300) + 0.5) / 1000
     added = np.array([shown(lambda t, u=u: moved(t, u)) for u in times])
-    within = np.abs(times) < 0.1
-    for covariance, some in ((near[0], added[within]), (far[0], added[~within])):
+    stretch = np.select([np.abs(times) >= 0.1, times < -H, times < 0, times < H], [0, 1, 2, 3], 4)
+    for number, covariance in enumerate(covariances[0]):
+        some = added[stretch == number]
         np.testing.assert_allclose(covariance, some.T @ some / 1000, rtol=2e-3, atol=1e-3 * covariance.max())
 
 

@@ -1,23 +1,38 @@
 """Speeds and accelerations told by places around a time, where nobody knows how jerkily a sensor is driven.
 
 Accelerations wander: the jerk is white noise, of a density that the places themselves tell, one near the time and one
-farther away, as a drive that was steady for long may just now become jerky
+farther away, as a drive that was steady for long may just now become jerky, or have one jolt
 [Rasmussen & Williams, Gaussian Processes, 2006, eq. 2.23 and 5.8].
 """
 
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.mapping.matching.jerk_fits import Densities, Window, evidences, mix
-from lidarcore.mapping.matching.white_jerk import wander
+from lidarcore.mapping.matching.white_jerk import STRETCHES, wander
 
-JERKS = np.array([0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
+JERKS = np.array([0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
 """What may change an acceleration within a second, from the steadiest drive to the jerkiest: m/s², m/s², rad/s²."""
-_ALIKE = np.stack([JERKS, JERKS], 1)
-PAIRS = np.array([[far, near] for far in JERKS for near in JERKS])
-"""Densities (64, 2, 3) farther from the time than the nearest places, and near."""
+STEADY = np.repeat(JERKS[:, None], STRETCHES, axis=1)
+"""Densities (9, 5, 3), the same in all stretches of time."""
+
+
+def _densities() -> Array:
+    """Of the stretches near the time, all are otherwise than the far one, or one alone is jerkier: there is a jolt."""
+    near = [[far, *[other] * (STRETCHES - 1)] for far in JERKS for other in JERKS]
+    jolts = [
+        [other if stretch == jolt else far for stretch in range(STRETCHES)]
+        for far, other in combinations(JERKS, 2)
+        for jolt in range(1, STRETCHES)
+    ]
+    return np.array(near + jolts)
+
+
+DENSITIES = _densities()
+"""Densities (225, 5, 3) in the stretches of time around a sweep, that a drive may have."""
 _NOISES = 2.0 ** np.arange(3, -8, -0.5)
 """Times the variances of places, which their noise may really have."""
 _ENOUGH = 300  # times that tell the noise
@@ -38,16 +53,15 @@ def window(told: Bools, t: Array, h: Array, places: Array, variances: Array, spe
     mean = np.stack([np.ones_like(t), t, t**2 / 2 + h[:, None] ** 2 / 6], -1) * told[..., None]
     basis = np.concatenate([mean, np.broadcast_to([[[0.0, 1.0, 0.0]]], (len(t), 1, 3))], 1)
     noise = np.where(told[..., None], variances, 1.0)
-    near, far = np.empty((2, len(t), t.shape[1] + 2, t.shape[1] + 2))
-    wander(t, h, near, far)
-    both = exist[:, :, None] & exist[:, None, :]
+    added = np.empty((len(t), STRETCHES, t.shape[1] + 2, t.shape[1] + 2))
+    wander(t, h, added)
+    both = exist[:, None, :, None] & exist[:, None, None, :]
     given = np.concatenate([np.where(told[..., None], places, 0.0), speeds[:, :1]], 1)
     return Window(
         basis,
         np.swapaxes(np.concatenate([noise, np.zeros((len(t), 1, 3))], 1), 1, 2).copy(),
         np.swapaxes(np.concatenate([np.zeros(noise.shape), speeds[:, 1:]], 1), 1, 2).copy(),
-        np.where(both, near, 0.0),
-        np.where(both, far, 0.0),
+        np.where(both, added, 0.0),
         np.swapaxes(given, 1, 2).copy(),
         own,
     )
@@ -58,7 +72,7 @@ class Drive(NamedTuple):
 
     noise   times the variances of the places, which is what explains them best: poses of scans on one map share its
             errors, which are no noise from one to the next; one factor, as the same surfaces tell all dimensions
-    shares  (64, 3) how often each pair of densities of the jerk explains them best
+    shares  (225, 3) how often each of the densities of the jerk explains them best
     """
 
     noise: float
@@ -68,9 +82,9 @@ class Drive(NamedTuple):
     def of(cls, given: Window) -> "Drive":
         """By some of its times, maximum likelihood of noise and jerk: one of them alone takes the other's place."""
         some = np.arange(0, len(given.told), -(-len(given.told) // _ENOUGH))
-        likelihoods = [_most_likely(given, some, noise, _ALIKE)[0] for noise in _NOISES]
+        likelihoods = [_most_likely(given, some, noise, STEADY)[0] for noise in _NOISES]
         noise = float(_NOISES[int(np.argmax(likelihoods))])
-        return cls(noise, _most_likely(given, some, noise, PAIRS)[1])
+        return cls(noise, _most_likely(given, some, noise, DENSITIES)[1])
 
 
 def _most_likely(given: Window, some: Ints, noise: float, jerks: Array) -> tuple[float, Array]:
@@ -97,5 +111,5 @@ def estimated(given: Window, drive: Drive) -> tuple[Array, Array, Array]:
     """
     T = len(given.told)
     rates, shared, spread = np.empty((T, 2, 3)), np.empty((T, 2, 3)), np.empty((T, 3, 2, 2))
-    mix(given, drive.noise, Densities(PAIRS, np.log(drive.shares)), rates, spread, shared)
+    mix(given, drive.noise, Densities(DENSITIES, np.log(drive.shares)), rates, spread, shared)
     return rates, spread, shared

@@ -19,9 +19,8 @@ class Window(NamedTuple):
     basis   (T, K, 3) of place, speed and acceleration at the time
     noise   (T, 3, K) variances of the places
     doubt   (T, 3, K) variance of the speed
-    near    (T, K + 1, K + 1) covariance of what white jerk of density 1 adds to them and, last, to how the sweep is
-            bent, if it is no farther from the time than the next place
-    far     (T, K + 1, K + 1) the same of jerk farther away
+    wander  (T, Z, K + 1, K + 1) covariance of what white jerk of density 1 in each of Z stretches of time adds to them
+            and, last, to how the sweep is bent
     told    (T, 3, K) m, m, rad; the speed, in these per second, is the last one
     own     (T,) which place is the one at the time itself
     """
@@ -29,15 +28,14 @@ class Window(NamedTuple):
     basis: Array
     noise: Array
     doubt: Array
-    near: Array
-    far: Array
+    wander: Array
     told: Array
     own: Ints
 
 
 class Densities(NamedTuple):
-    """D pairs of densities of the jerk, farther away and near, (D, 2, 3) m/s², m/s², rad/s² within a second; and how
-    often each is the one, as logarithms of shares (D, 3)."""
+    """D densities of the jerk in each stretch of time, (D, Z, 3) m/s², m/s², rad/s² within a second; and how often each
+    is the one, as logarithms of shares (D, 3)."""
 
     jerks: Array
     shares: Array
@@ -45,7 +43,7 @@ class Densities(NamedTuple):
 
 @kernel
 def evidences(window: Window, some: Ints, noise: float, jerks: Array, found: Array) -> None:
-    """Writes log evidences (D, S, 3) of `noise` times the variances and of densities (D, 2, 3) at some (S,) times."""
+    """Writes log evidences (D, S, 3) of `noise` times the variances and of densities (D, Z, 3) at some (S,) times."""
     K = window.told.shape[2]
     S, X, one = np.empty((K, K)), np.empty((K, 6)), np.empty(_FOUND)
     for n in range(len(jerks)):
@@ -84,16 +82,22 @@ def _fit(
     window: Window, k: int, d: int, noise: float, jerks: Array, S: Array, X: Array, found: Array
 ) -> None:
     """Log evidence, speed and acceleration with three numbers of their covariance, and their covariances with the error
-    of the place at the time, of one dimension at one time if the jerk has these densities (2,).
+    of the place at the time, of one dimension at one time if the jerk has these densities (Z,).
 
     Places are y = A x + e, where e, by noise and jerk, shares b with how the sweep is bent: E[bent | e] = b^T N^-1 e.
     """
-    K, far, near = len(S), jerks[0] ** 2, jerks[1] ** 2
+    K, own = len(S), 0.0
+    S[:], X[:, _BENT] = 0.0, 0.0
+    for z in range(len(jerks)):
+        density, added = jerks[z] ** 2, window.wander[k, z]
+        own += density * added[K, K]
+        for i in range(K):
+            X[i, _BENT] += density * added[i, K]
+            for j in range(i + 1):
+                S[i, j] += density * added[i, j]
     for i in range(K):
-        for j in range(i + 1):
-            S[i, j] = near * window.near[k, i, j] + far * window.far[k, i, j]
         S[i, i] += noise * window.noise[k, d, i] + window.doubt[k, d, i]
-        X[i, _Y], X[i, _BENT], X[i, _OWN] = window.told[k, d, i], near * window.near[k, i, K], 0.0
+        X[i, _Y], X[i, _OWN] = window.told[k, d, i], 0.0
         for j in range(3):
             X[i, _A + j] = window.basis[k, i, j]
     X[window.own[k], _OWN] = noise * window.noise[k, d, window.own[k]]
@@ -108,7 +112,7 @@ def _fit(
     found[_EVIDENCE] = -0.5 * (G[_Y, _Y] - H[0, 0]) - logs
     found[_RATES], found[_RATES + 1] = H[1, 0], H[2, 0] + G[_BENT, _Y]
     found[_SPREAD], found[_SPREAD + 1] = H[1, 1], H[1, 2]
-    found[_SPREAD + 2] = H[2, 2] + near * window.near[k, K, K] - G[_BENT, _BENT]
+    found[_SPREAD + 2] = H[2, 2] + own - G[_BENT, _BENT]
     found[_SHARED], found[_SHARED + 1] = H[1, 3], H[2, 3] + G[_BENT, _OWN]
 
 

@@ -10,21 +10,24 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 
+STRETCHES = 5
+"""Of the time around a sweep: all that is farther from its middle than the next sweep's middle; from the one before it
+until it begins, its own first half, its second one, and on to the next one."""
+_FAR, _BEFORE, _FIRST, _SECOND, _AFTER = range(STRETCHES)
 _AT, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # exact for products of two quartic polynomials
 
 
 @kernel
-def wander(t: Array, h: Array, near: Array, far: Array) -> None:
-    """Writes covariances (T, K + 2, K + 2) of what white jerk of density 1 adds to what sweeps show: K mean places, m;
-    the speed, m/s; and the bend, m/s².
+def wander(t: Array, h: Array, added: Array) -> None:
+    """Writes covariances (T, STRETCHES, K + 2, K + 2) of what white jerk of density 1 in each of the stretches adds to
+    what sweeps show: K mean places, m; the speed, m/s; and the bend, m/s².
 
     Mean places are those of sweeps around t (T, K) s, each h (T,) s before and after. Speed and bend are of the sweep
     around 0 s: the slope of the line through it, and by how much a steady acceleration would have to be higher for the
-    sweep to begin where it begins, seen from its mean place. `near` is by jerk that is no farther from 0 s than the
-    nearest of the other sweeps, `far` by the rest.
+    sweep to begin where it begins, seen from its mean place.
     """
     K = t.shape[1]
-    edges, added = np.empty(2 * K + 3), np.empty(K + 2)
+    edges, one = np.empty(2 * K + 3), np.empty(K + 2)
     for k in range(len(t)):
         beside = np.inf
         for i in range(K):
@@ -33,17 +36,27 @@ def wander(t: Array, h: Array, near: Array, far: Array) -> None:
             edges[i], edges[K + i] = max(abs(t[k, i]) - h[k], 0.0), abs(t[k, i]) + h[k]
         edges[2 * K], edges[2 * K + 1], edges[2 * K + 2] = 0.0, h[k], beside if beside < np.inf else h[k]
         edges.sort()
-        near[k], far[k] = 0.0, 0.0
+        added[k] = 0.0
         for e in range(len(edges) - 1):
             middle, half = (edges[e + 1] + edges[e]) / 2, (edges[e + 1] - edges[e]) / 2
-            covariance = near[k] if middle < beside else far[k]
             if half > 0:
                 for side in (-1.0, 1.0):
+                    covariance = added[k, _stretch(middle, side, h[k], beside)]
                     for g in range(len(_AT)):
-                        _add(t[k], h[k], middle + half * _AT[g], side, added)
+                        _add(t[k], h[k], middle + half * _AT[g], side, one)
                         for i in range(K + 2):
                             for j in range(K + 2):
-                                covariance[i, j] += half * _WEIGHTS[g] * added[i] * added[j]
+                                covariance[i, j] += half * _WEIGHTS[g] * one[i] * one[j]
+
+
+@kernel
+def _stretch(u: float, side: float, h: float, beside: float) -> int:
+    """Which stretch u s after 0 s (side 1) or before (-1) lies in; the nearest sweep is `beside` s away."""
+    if u >= beside:
+        return _FAR
+    if u < h:
+        return _FIRST if side < 0 else _SECOND
+    return _BEFORE if side < 0 else _AFTER
 
 
 @kernel
