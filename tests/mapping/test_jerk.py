@@ -6,7 +6,7 @@ from jerky_motions import motions, only
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
-from lidarcore.mapping.matching.jerk import DENSITIES, JERKS, STEADY, Drive, _most_likely, estimated, window
+from lidarcore.mapping.matching.jerk import JERKS, STEADY, Drive, _most_likely, estimated, window
 from lidarcore.mapping.matching.jerk_fits import evidences
 from lidarcore.mapping.matching.motion_smoothing import UNTOLD
 
@@ -108,7 +108,7 @@ def test_the_claims_hold_for_motions_whose_jerkiness_nobody_told():
     told = around(places[order])
     drive = Drive.of(told)
     assert drive.noise == 0.25
-    of_three = np.isclose(DENSITIES[:, :2, 0], 3.0)
+    of_three = np.isclose(drive.densities[:, :2, 0], 3.0)
     assert all(drive.shares[which, 0].sum() > 0.2 for which in of_three.T)
     rates, C, _ = estimated(told, drive)
     off = rates[:, :, 0] - np.stack([v, a], -1)[order]

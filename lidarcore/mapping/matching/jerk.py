@@ -37,6 +37,7 @@ _NOISES = 2.0 ** np.arange(3, -8, -0.5)
 """Times the variances of places, which their noise may really have."""
 _ENOUGH = 300  # times that tell the noise
 _RAREST = 1e-9  # share of a density, at least: no drive is so long that it rules one out
+_NEVER = 1e-6  # share of a density below which it explains nothing
 _SETTLED = 0.003  # share by which no density explains places better than all together: no other shares do
 _ROUNDS = 1000  # of expectation maximisation, at most
 _SHORTEST = 1e-8  # s that half a sweep takes, where it is taken at once
@@ -70,12 +71,14 @@ def window(told: Bools, t: Array, h: Array, places: Array, variances: Array, spe
 class Drive(NamedTuple):
     """What the places of a whole drive say of it.
 
-    noise   times the variances of the places, which is what explains them best: poses of scans on one map share its
-            errors, which are no noise from one to the next; one factor, as the same surfaces tell all dimensions
-    shares  (225, 3) how often each of the densities of the jerk explains them best
+    noise      times the variances of the places, which is what explains them best: poses of scans on one map share its
+               errors, which are no noise from one to the next; one factor, as the same surfaces tell all dimensions
+    densities  (D, 5, 3) of the jerk, those that explain any of the places
+    shares     (D, 3) how often each of these explains them best
     """
 
     noise: float
+    densities: Array
     shares: Array
 
     @classmethod
@@ -84,7 +87,10 @@ class Drive(NamedTuple):
         some = np.arange(0, len(given.told), -(-len(given.told) // _ENOUGH))
         likelihoods = [_most_likely(given, some, noise, STEADY)[0] for noise in _NOISES]
         noise = float(_NOISES[int(np.argmax(likelihoods))])
-        return cls(noise, _most_likely(given, some, noise, DENSITIES)[1])
+        shares = _most_likely(given, some, noise, DENSITIES)[1]
+        # Of drives that are looked at in part, the rest may be jerkier still: the steady densities stay.
+        counts = (shares > _NEVER).any(axis=1) | (DENSITIES[:, :1] == DENSITIES).all(axis=(1, 2))
+        return cls(noise, DENSITIES[counts], shares[counts])
 
 
 def _most_likely(given: Window, some: Ints, noise: float, jerks: Array) -> tuple[float, Array]:
@@ -111,5 +117,5 @@ def estimated(given: Window, drive: Drive) -> tuple[Array, Array, Array]:
     """
     T = len(given.told)
     rates, shared, spread = np.empty((T, 2, 3)), np.empty((T, 2, 3)), np.empty((T, 3, 2, 2))
-    mix(given, drive.noise, Densities(DENSITIES, np.log(drive.shares)), rates, spread, shared)
+    mix(given, drive.noise, Densities(drive.densities, np.log(drive.shares)), rates, spread, shared)
     return rates, spread, shared
