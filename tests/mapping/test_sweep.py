@@ -98,3 +98,14 @@ def test_where_an_arc_ends_is_where_small_steps_lead(covered):
     end = driven(lambda t: np.tile(np.array(covered) / 2.0, (len(t), 1)))[1][-1]
     np.testing.assert_allclose(arc_end(np.array(covered)), end, atol=1e-7)
     np.testing.assert_allclose(along_arc(end), covered, atol=1e-7)
+
+
+def test_a_scan_whose_beams_are_older_than_those_of_the_one_before_tells_no_motion():
+    sweep = Sweep()
+    late, early = (
+        Scan(np.full(101, 2.0), np.linspace(-3, 3, 101), beam_times=times) for times in (TIMES + 1.0, TIMES)
+    )
+    sweep.remove(late, None, None)
+    sweep.remove(early, None, None)
+    assert sweep.correct(early, np.zeros(3), np.array([0.1, 0.0, 0.0]), PERIOD) is early
+    assert (sweep.removed == 0).all()

@@ -79,9 +79,9 @@ class Sweep:
         In the mean time of its beams a scan is where it was found, whatever was taken out of it: the way between two
         such times tells the mean velocity between them, which is that of half-way.
         """
-        if scan.beam_times is None or not is_swept(scan) or dt > PAUSE:
-            return scan
         since = dt + self._half - self._half_before
+        if not is_swept(scan) or dt > PAUSE or since <= 0:  # beams in no order of time tell nothing
+            return scan
         covered = arc_end(self._half * self._removed)
         mean = along_arc(relative(compose(last, self._covered), compose(now, covered))) / since
         found, foreseen = self._now(mean, since)
