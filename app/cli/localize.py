@@ -12,6 +12,7 @@ from .options import (
     Topic,
     check_folder,
     check_output,
+    named,
     numbers,
     plural,
     settings_from,
@@ -37,6 +38,7 @@ def localize(
         typer.Option(
             "--map",
             metavar="FILE",
+            parser=named("map", "its path, or . for the one in the working folder"),
             help="to localize in: landmarks (.json, .csv, .geojson) or a grid (.yaml, as ROS and `lidarcore map` write "
             "it), or the folder of the latter; without, SLAM builds one",
         ),

@@ -3,6 +3,7 @@
 import errno
 import json
 import signal
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -16,16 +17,23 @@ if TYPE_CHECKING:
     from ..pipeline.settings import Settings
 
 
-def named_recording(name: str) -> Path:
-    """Raises BadParameter if the name is empty, as of a variable that is not set: it would mean the working folder."""
-    if not name.strip():
-        raise typer.BadParameter("the name of the recording is empty: give its path.")
-    return Path(name)
+def named(what: str, advice: str) -> Callable[[str], Path]:
+    """What reads a path that may not be empty, as of a variable that is not set: it would mean the working folder."""
+
+    def path(name: str) -> Path:
+        if not name.strip():
+            raise typer.BadParameter(f"the name of the {what} is empty: give {advice}.")
+        return Path(name)
+
+    return path
 
 
+named_folder = named("folder", "one, or . for the working folder")
 RecordingPath = Annotated[
     Path,
-    typer.Argument(parser=named_recording, help="a recording of any known format; its content decides"),
+    typer.Argument(
+        parser=named("recording", "its path"), help="a recording of any known format; its content decides"
+    ),
 ]
 Topic = Annotated[str | None, typer.Option(help="which lidar, if the recording has several")]
 TopicOfAll = Annotated[str | None, typer.Option(help="which lidar, if the recordings have several")]
@@ -76,13 +84,6 @@ def check_folder(file: Path, option: str = "--output") -> None:
             errno.ENOENT, f"is not a file in a folder that exists; give one for {option}", str(file)
         )
     _check_writable(file.absolute().parent, file, option)
-
-
-def named_folder(name: str) -> Path:
-    """Raises BadParameter if the name is empty, as of a variable that is not set: it would mean the working folder."""
-    if not name.strip():
-        raise typer.BadParameter("the name of the folder is empty: give one, or . for the working folder.")
-    return Path(name)
 
 
 def check_new_folder(folder: Path) -> None:

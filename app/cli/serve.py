@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Mode, Rpm, Set, SettingsFile, Topic, settings_from
+from .options import Mode, Rpm, Set, SettingsFile, Topic, named_folder, settings_from
 
 Recording = Annotated[
     Path | None,
@@ -27,7 +27,10 @@ Baud = Annotated[
     int | None, typer.Option(min=1200, max=10_000_000, help="baud rate of the sensor; 256000 if not given")
 ]
 Emulated = Annotated[bool, typer.Option("--emulator", help="use an emulated sensor, whatever is connected")]
-Recordings = Annotated[Path, typer.Option(help="folder of recordings, and where uploads go")]
+Recordings = Annotated[
+    Path,
+    typer.Option(metavar="FOLDER", parser=named_folder, help="folder of recordings, and where uploads go"),
+]
 Maps = Annotated[
     str | None,
     typer.Option(

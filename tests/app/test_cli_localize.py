@@ -141,6 +141,16 @@ def test_a_folder_where_a_file_of_a_map_belongs_is_told_before_the_work(tmp_path
     assert_refused(refused, "holds a folder plan.dxf, where a file of the map belongs")
 
 
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [(("localize", "room.npz", "--map", ""), "map"), (("serve", "--recordings", " "), "folder")],
+)
+def test_what_has_no_name_is_not_the_working_folder(arguments: tuple[str, ...], what: str) -> None:
+    refused = run(*arguments)
+    assert refused.returncode == 2
+    assert f"the name of the {what} is empty" in " ".join(refused.stderr.split())
+
+
 @pytest.mark.parametrize("command", ["info", "localize"])
 def test_a_recording_without_a_name_is_not_the_working_folder(command: str) -> None:
     refused = run(command, "")

@@ -91,6 +91,13 @@ def of_text_in_latin_1(folder: Path) -> object:
             lambda folder: Atlas(written(folder / "a.db", b"no database" * 100)),
             "a.db cannot be used: it is no database, or damaged; give another file, or a copy that is whole.",
         ),
+        *(
+            (
+                lambda folder, size=size: Atlas(written(folder / "a.db", b"x" * size)),
+                "a.db cannot be used: it is no database, or damaged; give another file, or a copy that is whole.",
+            )
+            for size in (1, 2, 15, 100)
+        ),
         (of_damaged_npz, "room.npz cannot be read as NumPy .npz: it is damaged or cut short, copy it anew."),
         (of_half_an_npz, "room.npz cannot be read as NumPy .npz: it is damaged or cut short, copy it anew."),
         (relations(damaged(gzip.compress(RELATIONS))), "hand.gz is not a file of relations: it is damaged"),
