@@ -89,6 +89,7 @@ def test_the_map_grows_and_a_new_one_begins_with_another_source_or_method(
     assert "give direction, too" in alone["detail"]
 
     answer = driving.http.get("/map/grid", params={"format": "zip"})
+    assert answer.headers["content-disposition"] == 'attachment; filename="map.zip"'
     with ZipFile(io.BytesIO(answer.content)) as archive:
         assert {"map.pgm", "map.yaml", "walls.csv", "plan.svg", "plan.dxf"} <= set(archive.namelist())
         archive.extractall(tmp_path / "map")

@@ -177,6 +177,7 @@ def test_walls_are_those_of_the_map_that_the_sensor_is_localized_in(server: Serv
     assert server.get("/walls") == server.get("/walls", session=run.session)
     server.next_frame()
     files = server.http.get("/map/grid", params={"format": "zip"}).raise_for_status()
+    assert files.headers["content-disposition"] == f'attachment; filename="map-{run.session}.zip"'
     with ZipFile(io.BytesIO(files.content)) as archive:
         assert len(archive.read("walls.csv").splitlines()) == 2
     two = {"first": "map-wall@0,1", "second": "map-wall@1,0"}

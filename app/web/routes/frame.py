@@ -13,7 +13,7 @@ from ...errors import NotFoundError
 from ...pipeline.frame import Frame
 from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns, csv_text, values
 from ..dependencies import CurrentFrame, Server
-from ..downloads import text_file
+from ..downloads import file_of
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
@@ -99,4 +99,4 @@ def _features(frame: Frame, fitter: str | None) -> Features:
 
 
 def _csv(stem: str, ids: list[int], columns: Columns, features: Features) -> Response:
-    return text_file(csv_text({"id": ids, **values(columns, features)}), "csv", stem)
+    return file_of(csv_text({"id": ids, **values(columns, features)}), "csv", stem)

@@ -18,9 +18,10 @@ from lidarcore.mapping.grid import OccupancyGrid, shades_of
 from lidarcore.mapping.walls import WallTable
 
 from ...errors import NotFoundError, NotYetError
+from ...jobs.maps.names import stem_of
 from ...pipeline.runtime import Runtime
 from ..dependencies import Server
-from ..openapi import MEDIA_TYPES
+from ..downloads import file_of
 from ..problems import documented
 from ..state import State
 
@@ -78,23 +79,25 @@ async def grid(
     png: black occupied, white free, grey unknown, y up. Its headers say where it lies: Grid-Resolution is the side of a
     pixel in m, Grid-Origin x (m), y (m) and heading (rad) of its lower left corner in the frame of the map.
     zip: map.pgm and map.yaml as ROS map_server reads them, the walls as CSV and GeoJSON, the plan as SVG and DXF, the
-    picture with its walls; poses are at /trajectory.
+    picture with its walls; poses are at /trajectory. It is named after the map that is localized in, or map.zip.
     404 if there is no such map, or it has no walls; 503 if it has none yet: until the first scan was mapped.
     """
     found = running_picture(server.runtime).grid
-    make = (
-        partial(_zip, found, running_walls(server.runtime)) if format == "zip" else partial(_grid_png, found)
-    )
+    make = partial(_grid_png, found)
+    if format == "zip":
+        kept = asked_session(server, None)
+        stem = "map" if kept is None else stem_of(server.landmarks.atlas, kept)
+        make = partial(_zip, found, running_walls(server.runtime), stem)
     return await anyio.to_thread.run_sync(make, limiter=server.heavy)
 
 
-def _zip(grid: OccupancyGrid, walls: WallTable) -> Response:
+def _zip(grid: OccupancyGrid, walls: WallTable, stem: str) -> Response:
     file = io.BytesIO()
     with tempfile.TemporaryDirectory(prefix="lidarcore-map-") as folder, ZipFile(file, "w") as archive:
         write_map(folder, grid, walls)
         for part in sorted(Path(folder).iterdir()):
             archive.write(part, part.name)
-    return Response(file.getvalue(), media_type=MEDIA_TYPES["zip"])
+    return file_of(file.getvalue(), "zip", stem)
 
 
 def _grid_png(found: OccupancyGrid) -> Response:

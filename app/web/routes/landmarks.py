@@ -15,7 +15,7 @@ from ...errors import NotFoundError
 from ...jobs.maps.names import stem_of
 from ...jobs.maps.store import LandmarkStore
 from ..dependencies import Server
-from ..downloads import text_file
+from ..downloads import file_of
 from ..map_queries import MOST, USUAL, Limit, Metres, Region, Which
 from ..openapi import formats
 from ..problems import documented, encode
@@ -87,7 +87,7 @@ def find(
         text = io.StringIO(newline="")
         write_landmarks(page.landmarks, text, format)
         stem = stem_of(server.landmarks.atlas, landmark_map.session)
-        answer = text_file(text.getvalue(), format, f"{stem}-landmarks")
+        answer = file_of(text.getvalue(), format, f"{stem}-landmarks")
     if page.next is not None:
         following = request.url.include_query_params(after=page.next)
         answer.headers["Link"] = f'<{following.path}?{following.query}>; rel="next"'

@@ -18,7 +18,7 @@ from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
 from ...records import record
 from ..dependencies import Server
-from ..downloads import text_file
+from ..downloads import file_of
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Body as Model
@@ -135,7 +135,7 @@ def trajectory(server: Server, since: Since = None, limit: Limit = 1000, format:
     rows = [row for row in poses if since is None or row.stamp > since][-limit:]
     if format == "csv":
         columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
-        return text_file(csv_text(columns), "csv", "trajectory")
+        return file_of(csv_text(columns), "csv", "trajectory")
     return encode({"poses": rows})
 
 

@@ -16,7 +16,7 @@ from lidarcore.evaluation.repeatability.tables import to_csv
 
 from ...errors import NotFoundError
 from ..dependencies import Server
-from ..downloads import text_file
+from ..downloads import file_of
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Pair
@@ -66,7 +66,7 @@ def read(
     """
     summary, running = server.repeatability.summary(), server.runtime.settings.repeatability.running
     if format == "csv":
-        return text_file(to_csv(summary), "csv", "repeatability")
+        return file_of(to_csv(summary), "csv", "repeatability")
     found = {field.name: getattr(summary, field.name) for field in fields(summary)}
     if not running and not summary.scans:
         found["message"] = OFF

@@ -16,7 +16,7 @@ from lidarcore.mapping.walls import WallTable, along, distances, in_box, nearest
 
 from ...jobs.maps.names import stem_of
 from ..dependencies import Server
-from ..downloads import text_file
+from ..downloads import file_of
 from ..map_queries import Metres, Region
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
@@ -123,7 +123,7 @@ def walls(
     if format == "json":
         return encode({"walls": wall_rows(asked, chosen)})
     text = walls_csv(asked, chosen) if format == "csv" else walls_geojson(asked, chosen)
-    return text_file(
+    return file_of(
         text, format, "walls" if kept is None else f"{stem_of(server.landmarks.atlas, kept)}-walls"
     )
 
