@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from ..pipeline.settings import Settings
 
 
-def named(what: str, advice: str) -> Callable[[str], Path]:
+def named(what: str, advice: str) -> Callable[[str | Path], Path]:
     """What reads a path that may not be empty, as of a variable that is not set: it would mean the working folder."""
 
-    def path(name: str) -> Path:
-        if not name.strip():
+    def path(name: str | Path) -> Path:  # a default is a path already
+        if not str(name).strip():
             raise typer.BadParameter(f"the name of the {what} is empty: give {advice}.")
         return Path(name)
 
