@@ -342,7 +342,8 @@ def test_who_localized_in_a_map_that_is_deleted_is_told_to_choose_another_one(vi
     )
     page.locator("#navigation .segments label", has_text="Off").click()
     wait_until(lambda: server.get("localization")["map"] is None, "it is chosen no longer")
-    page.locator("#navigation .segments label", has_text="Localize").click()
+    with page.expect_response(lambda answer: f"landmarks?session={stays}&" in answer.url):
+        page.locator("#navigation .segments label", has_text="Localize").click()
     wait_until(lambda: server.get("localization")["session"] == stays, "the newest is localized in")
     for one in server.get("sessions")["sessions"]:
         server.api.delete(f"sessions/{one['id']}").raise_for_status()
