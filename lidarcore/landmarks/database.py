@@ -28,9 +28,8 @@ class Database:
         self._lock = Lock()
         self._closed = False
         self._idle: deque[sqlite3.Connection] = deque()
-        if (
-            path.is_file() and path.stat().st_size == 1
-        ):  # SQLite takes that for an empty file, and writes over it
+        # SQLite takes a file of one byte for an empty one, and writes over it.
+        if path.is_file() and path.stat().st_size == 1:
             raise LandmarkMapError(f"The landmark map {path} cannot be used: {_WHY[sqlite3.SQLITE_NOTADB]}.")
         self._writer = self._connect()
         try:
