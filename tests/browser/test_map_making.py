@@ -57,7 +57,10 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
 
 def measure_as_rest_does(visitor: Visitor, session: int) -> None:
     """From a corner of the map that is localized in to a wall elsewhere; cards of its own walls are linked."""
-    page, told = visitor.page, visitor.knows("mapped")
+    page = visitor.page
+    visitor.server.patch("source", {"state": "paused"})  # else the view may move on between a place and a click
+    visitor.fit()
+    told = visitor.knows("mapped")
     corner = next(one for one in told["corners"] if len(one["walls"]) > 1)
     ids = {wall["id"] for wall in told["walls"]}
     assert {id for one in told["corners"] for id in one["walls"]} <= ids
