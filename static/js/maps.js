@@ -59,11 +59,11 @@ export function mountMaps() {
 
 let listed = ""; // when the maps were asked for: with which panel open, which map in use, how many walls in one that grows, and which list of sessions
 
-/** Asks while the list is seen, or a message is about one of them. */
+/** Asks while the list is seen, or the name of one of them: in a message, or where maps are made. */
 function refresh(panel, { session, mode }, { walls }, revision) {
   const wanted = [panel, session, mode, walls.length, revision].join(" ");
-  const isSeen = panel === "map" || isToldOf(KEY);
-  if (isSeen && listed !== wanted) listMaps();
+  const isNamed = isToldOf(KEY) || (panel === "sources" && isListed(get("making")?.session));
+  if ((panel === "map" || isNamed) && listed !== wanted) listMaps();
   listed = wanted;
 }
 
@@ -73,8 +73,11 @@ const called = ({ id, name }) => (name ? `${name} (map ${id})` : `map ${id}`);
 /** The same as a sentence begins: names stay as they are. */
 const begun = (map) => (map.name ? called(map) : `Map ${map.id}`);
 
+const withId = (id) => get("maps")?.sessions.find((session) => session.id === id);
+const isListed = (id) => Boolean(withId(id));
+
 /** The same of a map that may be none of those listed. */
-const byId = (id) => get("maps")?.sessions.find((session) => session.id === id) ?? { id };
+const byId = (id) => withId(id) ?? { id };
 export const calledById = (id) => called(byId(id));
 export const begunById = (id) => begun(byId(id));
 

@@ -41,6 +41,10 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
     assert len(poses) == 1 + server.get(f"recordings/{DEMO}/facts")["scans"]
 
     page.get_by_role("button", name="Localize in it").click()
+    expect(page.locator(".toast")).to_have_count(0)  # no message names it any more
+    server.patch(f"sessions/{session}", {"name": "Lobby"})
+    expect(page.locator("#made")).to_contain_text(f"Lobby (map {session}) of {DEMO}, made in")
+    server.patch(f"sessions/{session}", {"name": "emulated-s1"})
     page.get_by_role("tab", name="Map").click()
     expect(page.get_by_role("radio", name="Localize")).to_be_checked()
     kept = {f"W{wall['id']}" for wall in server.get(f"walls?session={session}")["walls"]}
