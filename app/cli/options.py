@@ -58,6 +58,7 @@ SettingsFile = Annotated[
     Path | None,
     typer.Option(
         "--settings",
+        parser=named("file of settings", "its path, or the name of a kind of sensor"),
         help="a JSON file of settings, as GET /api/v1/settings gives them, or the name of a kind of sensor, such as "
         "rplidar_a1_a2, for its noise",
     ),

@@ -143,7 +143,11 @@ def test_a_folder_where_a_file_of_a_map_belongs_is_told_before_the_work(tmp_path
 
 @pytest.mark.parametrize(
     ("arguments", "what"),
-    [(("localize", "room.npz", "--map", ""), "map"), (("serve", "--recordings", " "), "folder")],
+    [
+        (("localize", "room.npz", "--map", ""), "map"),
+        (("serve", "--recordings", " "), "folder"),
+        (("process", "room.npz", "-o", "room.json", "--settings", ""), "file of settings"),
+    ],
 )
 def test_what_has_no_name_is_not_the_working_folder(arguments: tuple[str, ...], what: str) -> None:
     refused = run(*arguments)
