@@ -62,7 +62,7 @@ def test_a_recording_becomes_a_map_that_can_be_localized_in(visitor: Visitor) ->
 def measure_as_rest_does(visitor: Visitor, session: int) -> None:
     """From a corner of the map that is localized in to a wall elsewhere; cards of its own walls are linked."""
     page = visitor.page
-    visitor.server.patch("source", {"state": "paused"})  # else the view may move on between a place and a click
+    visitor.server.patch("source", {"state": "paused"})  # else the view may move between place and click
     visitor.fit()
     told = visitor.knows("mapped")
     corner = next(one for one in told["corners"] if len(one["walls"]) > 1)
