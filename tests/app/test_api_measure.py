@@ -3,6 +3,8 @@
 import io
 import shutil
 import sqlite3
+import time
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from itertools import combinations
@@ -145,6 +147,19 @@ def assert_same(found: dict[tuple[str, str], Json], truth: dict[tuple[str, str],
                 assert found[pair][side]["id"] == told[side]["id"]
 
 
+def rested(told: Callable[[], list[Json]]) -> None:
+    """Wait until walls are of all scans: of a sensor that stands still they are sought every few seconds."""
+    walls, since = told(), time.monotonic()
+
+    def unchanged() -> bool:
+        nonlocal walls, since
+        if (now := told()) != walls:
+            walls, since = now, time.monotonic()
+        return time.monotonic() - since > 8
+
+    wait_until(unchanged, "the walls are of all scans", 60)
+
+
 @pytest.fixture
 def finished(server: Server) -> tuple[Server, int, dict[tuple[str, str], Json]]:
     """A map, its session, and what was measured in it as the last thing before it was finished."""
@@ -157,6 +172,7 @@ def finished(server: Server) -> tuple[Server, int, dict[tuple[str, str], Json]]:
     server.play(write_room(server.folder / "long.npz", scans=600))
     wait_until(lambda: [wall["count"] >= CONFIRMED for wall in told()] == 4 * [True], "all are confirmed", 60)
     server.change("PATCH", "/source", {"state": "paused"})
+    rested(told)
     wait_until(lambda: server.get("/sessions")["store"]["session"] is not None, "the map is kept")
     session = server.get("/sessions")["store"]["session"]
     wait_until(lambda: told(session=session) == told(), "all of it is on the disk")
