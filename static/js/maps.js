@@ -62,7 +62,7 @@ let listed = ""; // when the maps were asked for: with which panel open, which m
 /** Asks while the list is seen, or the name of one of them: in a message, or where maps are made. */
 function refresh(panel, { session, mode }, { walls }, revision) {
   const wanted = [panel, session, mode, walls.length, revision].join(" ");
-  const isNamed = isToldOf(KEY) || (panel === "sources" && isListed(get("making")?.session));
+  const isNamed = isToldOf(KEY) || (panel === "sources" && withId(get("making")?.session));
   if ((panel === "map" || isNamed) && listed !== wanted) listMaps();
   listed = wanted;
 }
@@ -74,7 +74,6 @@ const called = ({ id, name }) => (name ? `${name} (map ${id})` : `map ${id}`);
 const begun = (map) => (map.name ? called(map) : `Map ${map.id}`);
 
 const withId = (id) => get("maps")?.sessions.find((session) => session.id === id);
-const isListed = (id) => Boolean(withId(id));
 
 /** The same of a map that may be none of those listed. */
 const byId = (id) => withId(id) ?? { id };
