@@ -27,4 +27,4 @@ def motions(rng, n, jerk, steps, step):
 
 def only(number):
     """A drive all of whose jerks are of one density, and whose places are as noisy as they say."""
-    return Drive(1.0, STEADY[number : number + 1], np.ones((1, 3)))
+    return Drive(1.0, STEADY.densities[number : number + 1], np.ones((1, 3)))

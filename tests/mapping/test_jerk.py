@@ -6,7 +6,7 @@ from jerky_motions import motions, only
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
-from lidarcore.mapping.matching.jerk import JERKS, STEADY, Drive, _most_likely, estimated, window
+from lidarcore.mapping.matching.jerk import JERKS, STEADY, Drive, _most_likely, estimated, kinds, window
 from lidarcore.mapping.matching.jerk_fits import evidences
 from lidarcore.mapping.matching.motion_smoothing import UNTOLD
 
@@ -144,7 +144,7 @@ def test_no_other_shares_of_jerks_explain_places_better():
     places[:, :, 0] = y - y[:, 3:4] + rng.normal(0, SIGMA[0], y.shape)
     given, some = around(places), np.arange(120)
     found = np.empty((len(JERKS), 120, 3))
-    evidences(given, some, 1.0, STEADY, found)
+    evidences(given, some, 1.0, STEADY.densities, found)
     likelihoods = np.exp(found[:, :, 0])
     solved = minimize(
         lambda shares: -np.log(shares @ likelihoods).mean(),
@@ -155,7 +155,32 @@ def test_no_other_shares_of_jerks_explain_places_better():
     shares = _most_likely(given, some, 1.0, STEADY)[1][:, 0]
     assert solved.success
     assert shares.sum() == pytest.approx(1)
-    assert -np.log(shares @ likelihoods).mean() - solved.fun < 0.003
+    assert -np.log(shares @ likelihoods).mean() - solved.fun < 0.0003
+
+
+@pytest.mark.parametrize(
+    ("there", "lasts"),
+    [
+        (np.ones(7), [0.25, 0.05, 0.05, 0.05, 0.05, 0.25]),
+        ([0, 0, 0, 1, 1, 1, 1], [0.0, 0.0, 0.05, 0.05, 0.05, 0.25]),
+        ([0, 0, 1, 1, 0, 0, 0], [0.05, 0.05, 0.05, 0.05, 0.0, 0.0]),
+        ([0, 0, 0, 1, 0, 0, 0], [0.0, 0.0, 0.05, 0.05, 0.0, 0.0]),
+    ],
+)
+def test_a_jolt_is_as_likely_at_any_time_that_the_places_cover(there, lasts):
+    """Sweeps of 0.1 s, one after another: those that are told, the one in the middle among them."""
+    told = np.array([there], bool)
+    given = around(np.zeros((1, 7, 3)), h=0.05, told=told)
+    np.testing.assert_allclose(given.lasts, lasts, atol=1e-12)
+    of = kinds(given.lasts)
+    assert (of.densities[: of.first[len(JERKS)]] == STEADY.densities).all()
+    jolts = of.densities[of.first[len(JERKS)] :, :, 0].reshape(-1, 6, 6)
+    often = of.often[of.first[len(JERKS)] :].reshape(-1, 6)
+    assert len(jolts) == len(JERKS) * (len(JERKS) - 1) / 2
+    for densities, shares in zip(jolts, often, strict=True):
+        steady, jolted = np.unique(densities)
+        assert (densities == np.where(np.eye(6), jolted, steady)).all()
+        np.testing.assert_allclose(shares, np.array(lasts) / sum(lasts))
 
 
 def test_what_scatters_about_a_steady_way_is_noise_and_no_jerk():

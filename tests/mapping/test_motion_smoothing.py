@@ -132,6 +132,18 @@ def test_the_first_scan_is_as_far_off_as_its_own_place_and_the_speed_that_this_t
     assert 0.7 < np.mean(between) < 1.15
 
 
+def test_a_pose_has_what_its_motion_shares_with_as_much_of_the_error_of_its_place_as_the_map_kept():
+    """Against the sum of both errors, one dimension kept whole, one in part, one not at all."""
+    L, kept = np.random.default_rng(4).normal(size=(6, 9)), np.array([1.0, 0.6, 0.0])
+    joint = L @ L.T + 5 * np.eye(6)  # of what the motion does to the pose, and of the error of its place
+    both = np.hstack([np.eye(3), np.diag(kept)])
+    alone = np.hstack([np.zeros((3, 3)), np.diag(kept)])
+    added = both @ joint @ both.T - alone @ joint @ alone.T
+    motion = motions(np.zeros((1, 3)))[0]._replace(sweep=joint[:3, :3], shared=joint[:3, 3:])
+    assert (np.linalg.eigvalsh(added) > 0).all()
+    np.testing.assert_allclose(motion.stands(kept), added)
+
+
 def test_scans_on_a_map_of_few_claim_its_noise_but_tell_speeds_as_well_as_others():
     """150 drives as above, but of a speed that wanders as that of the steadiest drives does that are expected.
 

@@ -31,7 +31,7 @@ def test_covariances_add_up_what_impulses_one_by_one_do():
     wander(T[None], np.array([H]), covariances)
     times = (np.arange(-300, 300) + 0.5) / 1000
     added = np.array([shown(lambda t, u=u: moved(t, u)) for u in times])
-    stretch = np.select([np.abs(times) >= 0.1, times < -H, times < 0, times < H], [0, 1, 2, 3], 4)
+    stretch = np.searchsorted([-0.1, -H, 0, H, 0.1], times)
     for number, covariance in enumerate(covariances[0]):
         some = added[stretch == number]
         np.testing.assert_allclose(covariance, some.T @ some / 1000, rtol=2e-3, atol=1e-3 * covariance.max())

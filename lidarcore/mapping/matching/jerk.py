@@ -1,8 +1,8 @@
 """Speeds and accelerations told by places around a time, where nobody knows how jerkily a sensor is driven.
 
-Accelerations wander: the jerk is white noise, of a density that the places themselves tell, one near the time and one
-farther away, as a drive that was steady for long may just now become jerky, or have one jolt
-[Rasmussen & Williams, Gaussian Processes, 2006, eq. 2.23 and 5.8].
+Accelerations wander: the jerk is white noise, of a density that the places themselves tell. A drive is as steady at all
+times, or has a jolt once, which is as likely at any time [Rasmussen & Williams, Gaussian Processes, 2006, eq. 2.23
+and 5.8].
 """
 
 from itertools import combinations
@@ -16,31 +16,43 @@ from lidarcore.mapping.matching.white_jerk import STRETCHES, wander
 
 JERKS = np.array([0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
 """What may change an acceleration within a second, from the steadiest drive to the jerkiest: m/s², m/s², rad/s²."""
-STEADY = np.repeat(JERKS[:, None], STRETCHES, axis=1)
-"""Densities (9, 5, 3), the same in all stretches of time."""
-
-
-def _densities() -> Array:
-    """Of the stretches near the time, all are otherwise than the far one, or one alone is jerkier: there is a jolt."""
-    near = [[far, *[other] * (STRETCHES - 1)] for far in JERKS for other in JERKS]
-    jolts = [
-        [other if stretch == jolt else far for stretch in range(STRETCHES)]
-        for far, other in combinations(JERKS, 2)
-        for jolt in range(1, STRETCHES)
-    ]
-    return np.array(near + jolts)
-
-
-DENSITIES = _densities()
-"""Densities (225, 5, 3) in the stretches of time around a sweep, that a drive may have."""
 _NOISES = 2.0 ** np.arange(3, -8, -0.5)
 """Times the variances of places, which their noise may really have."""
 _ENOUGH = 300  # times that tell the noise
-_RAREST = 1e-9  # share of a density, at least: no drive is so long that it rules one out
+_RAREST = 1e-9  # share of a kind of drive, at least: no drive is so long that it rules one out
 _NEVER = 1e-6  # share of a density below which it explains nothing
-_SETTLED = 0.003  # share by which no density explains places better than all together: no other shares do
-_ROUNDS = 1000  # of expectation maximisation, at most
+_SETTLED = 0.0003  # share by which no kind of drive explains places better than all: no other shares do
+_ROUNDS = 5000  # of expectation maximisation, at most
 _SHORTEST = 1e-8  # s that half a sweep takes, where it is taken at once
+
+
+class Kinds(NamedTuple):
+    """Kinds of drives that places may show.
+
+    densities  (D, Z, 3) of the jerk in the stretches of time around a sweep
+    first      (N,) of these, which is the first of each kind
+    often      (D,) how often each is the one, where its kind is
+    """
+
+    densities: Array
+    first: Ints
+    often: Array
+
+
+STEADY = Kinds(np.repeat(JERKS[:, None], STRETCHES, axis=1), np.arange(len(JERKS)), np.ones(len(JERKS)))
+"""As steady at all times."""
+
+
+def kinds(lasts: Array) -> Kinds:
+    """Steady drives, and those that have a jolt: in any stretch of time, as often as it `lasts` (Z,) s."""
+    pairs = list(combinations(JERKS, 2))
+    one = np.eye(STRETCHES, dtype=np.bool_)[..., None]
+    jolts = np.concatenate([np.where(one, jolted, steady) for steady, jolted in pairs])
+    return Kinds(
+        np.concatenate([STEADY.densities, jolts]),
+        np.append(STEADY.first, len(JERKS) + STRETCHES * np.arange(len(pairs))),
+        np.append(STEADY.often, np.tile(lasts / lasts.sum(), len(pairs))),
+    )
 
 
 def window(told: Bools, t: Array, h: Array, places: Array, variances: Array, speeds: Array) -> Window:
@@ -65,7 +77,18 @@ def window(told: Bools, t: Array, h: Array, places: Array, variances: Array, spe
         np.where(both, added, 0.0),
         np.swapaxes(given, 1, 2).copy(),
         own,
+        _lasts(t, h),
     )
+
+
+def _lasts(t: Array, h: Array) -> Array:
+    """Mean lengths (Z,) s of the stretches of time around sweeps of half lengths h (T,), by places at t (T, K) s."""
+    beside = np.where(t == 0, np.inf, np.abs(t)).min(axis=1)
+    beside = np.where(np.isfinite(beside), np.maximum(beside, h), h)
+    ends = np.stack([-t.min(axis=1), t.max(axis=1)])
+    before, after = np.where(ends > 0, beside - h, 0.0)
+    early, late = np.maximum(ends + h - beside, 0.0)
+    return np.stack([early, before, h, h, after, late]).mean(axis=1)
 
 
 class Drive(NamedTuple):
@@ -73,7 +96,7 @@ class Drive(NamedTuple):
 
     noise      times the variances of the places, which is what explains them best: poses of scans on one map share its
                errors, which are no noise from one to the next; one factor, as the same surfaces tell all dimensions
-    densities  (D, 5, 3) of the jerk, those that explain any of the places
+    densities  (D, Z, 3) of the jerk, those that explain any of the places
     shares     (D, 3) how often each of these explains them best
     """
 
@@ -87,26 +110,31 @@ class Drive(NamedTuple):
         some = np.arange(0, len(given.told), -(-len(given.told) // _ENOUGH))
         likelihoods = [_most_likely(given, some, noise, STEADY)[0] for noise in _NOISES]
         noise = float(_NOISES[int(np.argmax(likelihoods))])
-        shares = _most_likely(given, some, noise, DENSITIES)[1]
+        of = kinds(given.lasts)
+        shares = _most_likely(given, some, noise, of)[1]
         # Of drives that are looked at in part, the rest may be jerkier still: the steady densities stay.
-        counts = (shares > _NEVER).any(axis=1) | (DENSITIES[:, :1] == DENSITIES).all(axis=(1, 2))
-        return cls(noise, DENSITIES[counts], shares[counts])
+        counts = (shares > _NEVER).any(axis=1) | (np.arange(len(shares)) < len(JERKS))
+        return cls(noise, of.densities[counts], shares[counts])
 
 
-def _most_likely(given: Window, some: Ints, noise: float, jerks: Array) -> tuple[float, Array]:
+def _most_likely(given: Window, some: Ints, noise: float, of: Kinds) -> tuple[float, Array]:
     """Log-likelihood of `noise` times the variances at some of the times, with the shares (D, 3) of densities that make
     it largest."""
-    found = np.empty((len(jerks), len(some), 3))
-    evidences(given, some, noise, jerks, found)
+    found = np.empty((len(of.densities), len(some), 3))
+    evidences(given, some, noise, of.densities, found)
     highest = found.max(axis=0)
-    likelihoods, shares = np.exp(found - highest), np.full((len(jerks), 3), 1 / len(jerks))
+    likelihoods = np.add.reduceat(of.often[:, None, None] * np.exp(found - highest), of.first)
+    likelihoods = np.ascontiguousarray(likelihoods.transpose(2, 0, 1))  # (3, N, S)
+    shares = np.full((3, 1, len(of.first)), 1 / len(of.first))
     for _ in range(_ROUNDS):
-        mixed = np.einsum("nsd,nd->sd", likelihoods, shares)
-        gains = np.einsum("nsd,sd->nd", likelihoods, 1 / mixed) / len(some)
+        mixed = shares @ likelihoods
+        gains = (1 / mixed) @ likelihoods.mT / len(some)
         if gains.max() < 1 + _SETTLED:
             break
         shares = np.maximum(shares * gains, _RAREST)
-    return float((highest + np.log(mixed)).sum()), shares
+    each = np.diff(np.append(of.first, len(of.densities)))
+    shares = np.repeat(shares[:, 0].T, each, axis=0) * of.often[:, None]
+    return float(highest.sum() + np.log(mixed).sum()), shares
 
 
 def estimated(given: Window, drive: Drive) -> tuple[Array, Array, Array]:

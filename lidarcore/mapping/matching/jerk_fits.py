@@ -23,6 +23,7 @@ class Window(NamedTuple):
             and, last, to how the sweep is bent
     told    (T, 3, K) m, m, rad; the speed, in these per second, is the last one
     own     (T,) which place is the one at the time itself
+    lasts   (Z,) s, how long each stretch of time lasts, on average
     """
 
     basis: Array
@@ -31,6 +32,7 @@ class Window(NamedTuple):
     wander: Array
     told: Array
     own: Ints
+    lasts: Array
 
 
 class Densities(NamedTuple):

@@ -15,7 +15,10 @@ from lidarcore.mapping.matching.jerk_fits import Window
 from lidarcore.mapping.matching.sweep import PAUSE
 
 _SCANS = 7
-"""Scans that tell a speed: as many at an end, where those nearest to it would not tell how steady the drive is."""
+"""Scans that tell a speed: as many at an end, where those nearest to it would not tell how steady the drive is.
+
+More make a steady speed truer, and a turn that begins or ends less so.
+"""
 _MEDIAN = 0.455  # of a square, in units of its variance
 _ROUNDS = 3  # a wrong speed shifts scans, from which it is told: a tenth of it comes back
 UNTOLD = np.array([np.zeros(3), np.full(3, 1e4)])
@@ -55,7 +58,8 @@ class ScanMotion(NamedTuple):
 
         A speed that is told by the place itself, wrong with it, makes the scan stand farther off, or less far.
         """
-        values, V = np.linalg.eigh(self.sweep + kept * (self.shared + self.shared.T))
+        shared = kept * self.shared
+        values, V = np.linalg.eigh(self.sweep + shared + shared.T)
         added: Array = (V * np.maximum(values, 0.0)) @ V.T
         return added
 
@@ -129,7 +133,7 @@ def smoothed(stamps: Array, poses: Array, motions: list[ScanMotion]) -> tuple[Ar
 
 
 def _beside(stamps: Array) -> tuple[Ints, Bools]:
-    """Numbers (T, 7) of the scans that tell the speed of each, and which of them exist: none beyond a pause does."""
+    """Numbers (T, K) of the scans that tell the speed of each, and which of them exist: none beyond a pause does."""
     runs = np.cumsum(np.append(0, np.diff(stamps) >= PAUSE))
     first, end = np.searchsorted(runs, runs), np.searchsorted(runs, runs, "right")
     begin = np.maximum(np.minimum(np.arange(len(stamps)) - _SCANS // 2, end - _SCANS), first)

@@ -10,10 +10,10 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
 
-STRETCHES = 5
-"""Of the time around a sweep: all that is farther from its middle than the next sweep's middle; from the one before it
-until it begins, its own first half, its second one, and on to the next one."""
-_FAR, _BEFORE, _FIRST, _SECOND, _AFTER = range(STRETCHES)
+STRETCHES = 6
+"""Of the time around a sweep: until the middle of the one before it, and from there until it begins; its own first
+half, and its second one; on to the middle of the next one, and all that is later."""
+_EARLY, _BEFORE, _FIRST, _SECOND, _AFTER, _LATE = range(STRETCHES)
 _AT, _WEIGHTS = np.polynomial.legendre.leggauss(5)  # exact for products of two quartic polynomials
 
 
@@ -53,7 +53,7 @@ def wander(t: Array, h: Array, added: Array) -> None:
 def _stretch(u: float, side: float, h: float, beside: float) -> int:
     """Which stretch u s after 0 s (side 1) or before (-1) lies in; the nearest sweep is `beside` s away."""
     if u >= beside:
-        return _FAR
+        return _EARLY if side < 0 else _LATE
     if u < h:
         return _FIRST if side < 0 else _SECOND
     return _BEFORE if side < 0 else _AFTER
