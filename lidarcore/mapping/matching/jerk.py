@@ -110,30 +110,30 @@ class Drive(NamedTuple):
         some = np.arange(0, len(given.told), -(-len(given.told) // _ENOUGH))
         likelihoods = [_most_likely(given, some, noise, STEADY)[0] for noise in _NOISES]
         noise = float(_NOISES[int(np.argmax(likelihoods))])
-        of = kinds(given.lasts)
-        shares = _most_likely(given, some, noise, of)[1]
+        among = kinds(given.lasts)
+        shares = _most_likely(given, some, noise, among)[1]
         # Of drives that are looked at in part, the rest may be jerkier still: the steady densities stay.
         counts = (shares > _NEVER).any(axis=1) | (np.arange(len(shares)) < len(JERKS))
-        return cls(noise, of.densities[counts], shares[counts])
+        return cls(noise, among.densities[counts], shares[counts])
 
 
-def _most_likely(given: Window, some: Ints, noise: float, of: Kinds) -> tuple[float, Array]:
-    """Log-likelihood of `noise` times the variances at some of the times, with the shares (D, 3) of densities that make
-    it largest."""
-    found = np.empty((len(of.densities), len(some), 3))
-    evidences(given, some, noise, of.densities, found)
+def _most_likely(given: Window, some: Ints, noise: float, among: Kinds) -> tuple[float, Array]:
+    """Log-likelihood of `noise` times the variances at some of the times, with the shares (D, 3) of densities among
+    these that make it largest."""
+    found = np.empty((len(among.densities), len(some), 3))
+    evidences(given, some, noise, among.densities, found)
     highest = found.max(axis=0)
-    likelihoods = np.add.reduceat(of.often[:, None, None] * np.exp(found - highest), of.first)
+    likelihoods = np.add.reduceat(among.often[:, None, None] * np.exp(found - highest), among.first)
     likelihoods = np.ascontiguousarray(likelihoods.transpose(2, 0, 1))  # (3, N, S)
-    shares = np.full((3, 1, len(of.first)), 1 / len(of.first))
+    shares = np.full((3, 1, len(among.first)), 1 / len(among.first))
     for _ in range(_ROUNDS):
         mixed = shares @ likelihoods
         gains = (1 / mixed) @ likelihoods.mT / len(some)
         if gains.max() < 1 + _SETTLED:
             break
         shares = np.maximum(shares * gains, _RAREST)
-    each = np.diff(np.append(of.first, len(of.densities)))
-    shares = np.repeat(shares[:, 0].T, each, axis=0) * of.often[:, None]
+    each = np.diff(np.append(among.first, len(among.densities)))
+    shares = np.repeat(shares[:, 0].T, each, axis=0) * among.often[:, None]
     return float(highest.sum() + np.log(mixed).sum()), shares
 
 
