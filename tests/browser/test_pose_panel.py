@@ -83,9 +83,23 @@ def test_the_time_per_scan_stays_when_a_recording_is_played_again_at_full_speed(
     wait_until(lambda: visitor.knows("frame")["localization"], "scans are localized")
     wait_until(lambda: visitor.knows("frame")["timings"]["locate_us"] is None, "it is played again")
     expect(page.locator("#count-locate")).to_have_text(re.compile(r"^\d.*s$"))
+
+
+def test_no_time_per_scan_is_shown_where_only_scans_that_were_seen_before_are(visitor: Visitor) -> None:
+    """As by a page that is opened when a recording is played again."""
+    server, page = visitor.server, visitor.page
+    open_windsor(server, index=10)
+    for _ in range(3):
+        frame = server.step(1)
+    assert frame["timings"]["locate_us"] is not None
+    frame = server.step(-1)
+    visitor.await_frame(frame)
+    assert frame["timings"]["locate_us"] is None
+    page.get_by_role("tab", name="Map").click()
+    expect(page.locator("#count-locate")).to_have_text(re.compile(r"^\d.*s$"))  # what the last new scan took
     page.reload()
     expect(page.locator("#pose-x")).to_have_text(re.compile(r"\d"))
-    expect(page.get_by_text("Time per scan", exact=True).first).to_be_hidden()  # nothing tells it
+    expect(page.get_by_text("Time per scan", exact=True).first).to_be_hidden()
 
 
 def hold_frames(visitor: Visitor) -> Callable[[], None]:
