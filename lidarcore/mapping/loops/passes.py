@@ -1,5 +1,7 @@
 """Earlier passes of a place that a new keyframe may have come back to, and what was seen on them."""
 
+from itertools import zip_longest
+
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
@@ -101,10 +103,11 @@ class Passes:
 
     def _kept(self, nodes: Ints) -> Ints:
         """Those of the nodes whose scans are still there."""
-        there: Ints = nodes[np.array([n in self._keyframes for n in nodes.tolist()], bool)]
-        return there
+        there = [node for node in nodes.tolist() if node in self._keyframes]
+        return nodes if len(there) == len(nodes) else np.array(there, np.int64)
 
 
 def _runs(nodes: Ints) -> list[Ints]:
     """Successive numbers together, with small gaps."""
-    return [run for run in np.split(nodes, np.flatnonzero(np.diff(nodes) > 3) + 1) if len(run)]
+    begins = [0, *(np.flatnonzero(nodes[1:] - nodes[:-1] > 3) + 1).tolist()] if len(nodes) else []
+    return [nodes[begin:end] for begin, end in zip_longest(begins, begins[1:])]
