@@ -284,7 +284,12 @@ def test_a_recording_that_is_opened_again_leaves_one_map_beside_the_one_that_is_
     server.change("PATCH", "/settings", SLAM)
     built: list[int] = []
     for _ in range(4):
-        server.change("PUT", "/source", {"kind": "recording", "name": room.name})
+        server.change("PUT", "/source", {"kind": "recording", "name": room.name, "paused": True})
+        with server.stream() as stream:
+            for _ in range(9):  # each map is of the same scans
+                server.change("POST", "/source/step", {"by": 3})
+                at = server.get("/source")["index"]
+                stream.frame(lambda f, at=at: chosen(f) and f["source"]["index"] == at)
         wait_until(lambda: server.get("/localization")["session"] not in (None, *built))
         built.append(server.get("/localization")["session"])
     wait_until(lambda: maps() == built[-2:])
