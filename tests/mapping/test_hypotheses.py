@@ -104,3 +104,13 @@ def test_what_nodes_saw_together_is_what_each_saw_seen_from_one_of_them():
     in_map = [act(truth[node], one.means) for node, one in zip(nodes, near, strict=True)]
     np.testing.assert_allclose(act(truth[32], seen.means), np.concatenate(in_map), atol=1e-9)
     np.testing.assert_array_equal(seen.counts, np.concatenate([one.counts for one in near]))
+
+
+@pytest.mark.parametrize("found", [[5, 6, 7, 8, 9, 12, 13, 14], [18, 19, 20], [40]])
+def test_a_pass_ends_where_the_way_leads_away_for_more_than_two_nodes(found):
+    near, graph = {5, 6, 7, 8, 9, 12, 13, 14, 18, 19, 20, 40}, PoseGraph()
+    for node in range(1, 61):
+        graph.add([0.0 if node in near else 50.0, 0.0, 0.0])
+    passes = Passes(graph, {}, LoopSettings(before=0), MATCH.reach)
+    for i in found:
+        assert passes.around(i, 60, 1.0).tolist() == found

@@ -1,6 +1,6 @@
 """Earlier passes of a place that a new keyframe may have come back to, and what was seen on them."""
 
-from itertools import zip_longest
+from itertools import pairwise
 
 import numpy as np
 
@@ -103,11 +103,10 @@ class Passes:
 
     def _kept(self, nodes: Ints) -> Ints:
         """Those of the nodes whose scans are still there."""
-        there = [node for node in nodes.tolist() if node in self._keyframes]
-        return nodes if len(there) == len(nodes) else np.array(there, np.int64)
+        return np.array([node for node in nodes.tolist() if node in self._keyframes], np.int64)
 
 
 def _runs(nodes: Ints) -> list[Ints]:
     """Successive numbers together, with small gaps."""
-    begins = [0, *(np.flatnonzero(nodes[1:] - nodes[:-1] > 3) + 1).tolist()] if len(nodes) else []
-    return [nodes[begin:end] for begin, end in zip_longest(begins, begins[1:])]
+    edges = [0, *(np.flatnonzero(nodes[1:] - nodes[:-1] > 3) + 1).tolist(), len(nodes)]
+    return [nodes[begin:end] for begin, end in pairwise(edges) if end > begin]
