@@ -11,7 +11,8 @@ from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.graph.adjustment import _VAGUE, Surfaces, normal_equations, speeds_left
 from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
-from lidarcore.mapping.graph.refinement import Step, _measured, refine
+from lidarcore.mapping.graph.equations import Step
+from lidarcore.mapping.graph.refinement import _measured, refine
 from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.sweep import without
@@ -46,8 +47,8 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
     since = rng.uniform(-0.05, 0.05, 9)
     seen = Observations(keyframes, means, normals, variances, np.ones(9, bool), since)
     of_it = Surfaces(seen, np.zeros(len(poses), np.int64), 0.5), poses, Noise(2.0, 0.003**2)
-    sums, left = normal_equations(*of_it), speeds_left(*of_it)
-    assert len(sums.groups.squares) == 3  # in one cell
+    (sums, groups), left = normal_equations(*of_it), speeds_left(*of_it)
+    assert len(groups.squares) == 3  # in one cell
     weights = 1 / (2 * variances + 3 * 0.003**2)
     middle = world.mean(axis=0)
     ends = np.concatenate([world + np.array([0.03, 0]), world - np.array([0.03, 0])]) - middle
@@ -67,7 +68,7 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
     H, g = J.T @ J, J.T @ residuals(x0)
     schur = H[:18, :18] - H[:18, 18:] @ np.linalg.solve(H[18:, 18:], H[18:, :18])
     rest = g[:18] - H[:18, 18:] @ np.linalg.solve(H[18:, 18:], g[18:])
-    np.testing.assert_allclose(sums.information.toarray(), schur[:9, :9], rtol=1e-5, atol=1e-2)
+    np.testing.assert_allclose(sums.information().toarray(), schur[:9, :9], rtol=1e-5, atol=1e-2)
     np.testing.assert_allclose(sums.gradient, rest[:9], rtol=1e-5, atol=1e-3)
     for k in range(3):
         of_k = np.r_[3 * k : 3 * k + 3, 9 + 3 * k : 12 + 3 * k]
@@ -92,8 +93,8 @@ def test_a_wall_that_bends_has_the_directions_of_its_parts():
         n = len(means)
         seen = Observations(keyframes, means, normals, np.full(n, 1e-6), np.ones(n, bool), np.zeros(n))
         surfaces = Surfaces(seen, np.zeros(2, np.int64), 0.5)
-        found = normal_equations(surfaces, np.zeros((2, 3)), Noise(1.0, 0.0))
-        return found.information.toarray()
+        found, _ = normal_equations(surfaces, np.zeros((2, 3)), Noise(1.0, 0.0))
+        return found.information().toarray()
 
     apart = information(parts[0]) + information(parts[1])
     together = information(*parts)

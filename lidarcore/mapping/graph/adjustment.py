@@ -8,12 +8,13 @@ eliminated: what remains ties all keyframes that saw it to each other, each piec
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import rotate, rotation
 from lidarcore.mapping.cells import cells
 from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells
+from lidarcore.mapping.graph.equations import NormalEquations
 from lidarcore.mapping.graph.known import Known, parted
 
 _GAP = 0.15  # m between two surfaces side by side
@@ -38,22 +39,11 @@ class Surfaces(NamedTuple):
     known: Known | None = None
 
 
-class NormalEquations(NamedTuple):
-    """The normal equations of K poses, without the lines of the cells, and what is left of each group.
-
-    information  (3 K, 3 K) sparse
-    gradient     (3 K,)
-    """
-
-    information: csr_array
-    gradient: Array
-    groups: Groups
-
-
-def normal_equations(surfaces: Surfaces, poses: Array, noise: Noise) -> NormalEquations:
-    """The normal equations at poses (K, 3), by the cells that several keyframes of one island saw."""
+def normal_equations(surfaces: Surfaces, poses: Array, noise: Noise) -> tuple[NormalEquations, Groups]:
+    """The normal equations at poses (K, 3), by the cells that several keyframes of one island saw; what is left of each
+    group."""
     sums, groups, lines = _summed(surfaces, poses, noise, 3)
-    return NormalEquations(_sparse(sums.D, sums.U, sums.at, lines), sums.g.ravel(), groups)
+    return NormalEquations(*_sparse(sums.D, sums.U, sums.at, lines), sums.g.ravel()), groups
 
 
 def speeds_left(surfaces: Surfaces, poses: Array, noise: Noise) -> Array:
@@ -131,15 +121,12 @@ def _ordered(
     return order, np.append(np.flatnonzero(np.diff(number[order], prepend=-1)), len(order))
 
 
-def _sparse(D: Array, U: Array, at: Ints, lines: int) -> csr_array:
-    """D less U U^T."""
+def _sparse(D: Array, U: Array, at: Ints, lines: int) -> tuple[csr_array, csr_array]:
+    """D (3 K, 3 K) and U (3 K, 2 L) as sparse matrices."""
     K = len(D)
     rows = (3 * at[:, 0, None, None] + np.arange(3)[:, None] + 0 * np.arange(2)).ravel()
     columns = (2 * at[:, 1, None, None] + 0 * np.arange(3)[:, None] + np.arange(2)).ravel()
-    tall = coo_array((U.ravel(), (rows, columns)), shape=(3 * K, 2 * lines)).tocsr()
+    tall = csr_array((U.ravel(), (rows, columns)), shape=(3 * K, 2 * lines))
     index = 3 * np.arange(K)[:, None, None] + np.zeros((3, 3), np.int64)
-    diagonal = coo_array(
-        (D.ravel(), ((index + np.arange(3)[:, None]).ravel(), (index + np.arange(3)).ravel())),
-        shape=(3 * K, 3 * K),
-    )
-    return csr_array(diagonal.tocsr() - tall @ tall.T)
+    own = (index + np.arange(3)[:, None]).ravel(), (index + np.arange(3)).ravel()
+    return csr_array((D.ravel(), own), shape=(3 * K, 3 * K)), tall

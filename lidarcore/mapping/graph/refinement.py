@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.sparse import csc_array, diags_array
 from scipy.special import chdtr
 
 from lidarcore.arrays import Array, Bools, Ints
@@ -17,17 +16,15 @@ from lidarcore.geometry import (
     UncertainPose,
     compose,
     compose_jacobians,
-    pose_difference,
-    relative,
     relative_jacobians,
     rotation,
     wrap,
 )
 from lidarcore.geometry.kernels import relative_with_covariance
-from lidarcore.mapping.graph.adjustment import NormalEquations, Surfaces, normal_equations, speeds_left
+from lidarcore.mapping.graph.adjustment import Surfaces, normal_equations, speeds_left
 from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
+from lidarcore.mapping.graph.equations import Step
 from lidarcore.mapping.graph.known import Known
-from lidarcore.mapping.graph.pose_graph import FIXED
 from lidarcore.mapping.graph.recovery import Recovery, factor
 from lidarcore.mapping.matching.patches import Patches
 
@@ -37,16 +34,6 @@ _MEASURED = 4  # rounds after which noise is known so well that steps can be com
 UNMEASURED = Noise(1.0, 0.005**2)
 _LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
 _INNER = float(chdtr(3, _LARGEST) / chdtr(1, _LARGEST))  # times as expected the mean square of the others is
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Step:
-    """How keyframe j was reached from keyframe i, but for the surfaces that tie them: T_i_j (3,), covariance (3, 3)."""
-
-    i: int
-    j: int
-    pose: Array
-    covariance: Array
 
 
 @dataclass(slots=True, eq=False)
@@ -126,23 +113,24 @@ def refine(
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
     surfaces = Surfaces(_observations(scans, since, assumed**2), islands, size, known)
-    poses, before = poses.copy(), np.inf
+    poses, before, near = poses.copy(), np.inf, None
     for number in range(rounds):
-        equations = normal_equations(surfaces, poses, noise)
-        H, g = _with_steps(equations, poses, steps)
-        step = factor(H).solve(-g)
+        equations, groups = normal_equations(surfaces, poses, noise)
+        equations = equations.with_steps(poses, steps)
+        near = near or factor(equations.information())
+        step = equations.solution(near)
         poses = poses + step.reshape(-1, 3)
         poses[:, 2] = wrap(poses[:, 2])
-        taken, noise = noise, _measured(equations.groups, len(poses))
-        size = float(-g @ step) / len(g)
-        if size < _SETTLED and _is_alike(taken, noise, equations.groups):
+        taken, noise = noise, _measured(groups, len(poses))
+        size = float(-equations.gradient @ step) / len(step)
+        if size < _SETTLED and _is_alike(taken, noise, groups):
             break
         # Cells are cut anew in each round, which alone moves poses of a large building by some tenths of a deviation.
         if number >= _MEASURED and size >= before:
             break
         before = size
-    equations = normal_equations(surfaces, poses, noise)
-    recovery = Recovery(factor(_with_steps(equations, poses, steps)[0]))
+    equations, _ = normal_equations(surfaces, poses, noise)
+    recovery = Recovery(factor(equations.with_steps(poses, steps).information()))
     speeds = speeds_left(surfaces, poses, noise)
     return Refined(poses, sweeps, speeds, _joined(known, len(poses)), noise, recovery)
 
@@ -172,27 +160,6 @@ def _observations(scans: list[Patches], since: list[Array] | None, assumed: floa
     times = np.zeros(len(numbers)) if since is None else np.concatenate(since)
     means, normals, variances, near = (np.concatenate(column) for column in columns)
     return Observations(numbers, means, normals, variances, near, times)
-
-
-def _with_steps(equations: NormalEquations, poses: Array, steps: list[Step]) -> tuple[csc_array, Array]:
-    """The normal equations with the steps, and the first pose fixed."""
-    H, g = equations.information, equations.gradient.copy()
-    ends = np.array([(step.i, step.j) for step in steps], np.int64).reshape(-1, 2)
-    z = np.array([step.pose for step in steps]).reshape(-1, 3)
-    covariances = np.array([step.covariance for step in steps]).reshape(-1, 3, 3)
-    a, b = poses[ends[:, 0]], poses[ends[:, 1]]
-    A, B = relative_jacobians(a, b)
-    e = pose_difference(relative(a, b), z)
-    W = np.linalg.inv(covariances)
-    J = np.concatenate([A, B], -1)
-    blocks = np.swapaxes(J, -1, -2) @ W @ J
-    index = (3 * ends[:, :, None] + np.arange(3)).reshape(-1, 6)
-    np.add.at(g, index, np.einsum("nki,nkl,nl->ni", J, W, e))
-    row, column = np.broadcast_arrays(index[:, :, None], index[:, None, :])
-    fixed = np.zeros(len(g))
-    fixed[:3] = FIXED
-    tied = csc_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=H.shape)
-    return csc_array(H + tied + diags_array(fixed)), g
 
 
 def _measured(groups: Groups, keyframes: int) -> Noise:

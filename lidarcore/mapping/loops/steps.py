@@ -8,9 +8,9 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose, pose_difference, squared_mahalanobis
 from lidarcore.mapping.doubt import DOUBTFUL, trust
+from lidarcore.mapping.graph.equations import Step
 from lidarcore.mapping.graph.known import Known
 from lidarcore.mapping.graph.pose_graph import PoseGraph
-from lidarcore.mapping.graph.refinement import Step
 from lidarcore.mapping.matching.odometry_calibration import effects
 from lidarcore.mapping.tracked import Tracked
 

@@ -1,0 +1,72 @@
+"""The normal equations of an adjustment: what surfaces say of all poses, what steps say besides, and their solution."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.sparse import csc_array, csr_array, diags_array
+from scipy.sparse.linalg import LinearOperator, SuperLU, cg
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import pose_difference, relative, relative_jacobians
+from lidarcore.mapping.graph.pose_graph import FIXED
+from lidarcore.mapping.graph.recovery import factor
+
+_EXACT = 1e-8  # of the gradient may be left: poses are solved to a thousandth of a standard deviation
+_ROUNDS = 40  # of conjugate gradients, after which a factor of its own costs less
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """How keyframe j was reached from keyframe i, but for the surfaces that tie them: T_i_j (3,), covariance (3, 3)."""
+
+    i: int
+    j: int
+    pose: Array
+    covariance: Array
+
+
+class NormalEquations(NamedTuple):
+    """H x = -gradient of K poses, where H = own - lines lines^T, less the lines of cells that several keyframes saw.
+
+    own       (3 K, 3 K) sparse
+    lines     (3 K, 2 L) sparse
+    gradient  (3 K,)
+    """
+
+    own: csr_array
+    lines: csr_array
+    gradient: Array
+
+    def information(self) -> csc_array:
+        """H (3 K, 3 K), in which all keyframes that saw a surface are tied to each other: nearly dense in a room."""
+        return csc_array(self.own - self.lines @ self.lines.T)
+
+    def with_steps(self, poses: Array, steps: list[Step]) -> "NormalEquations":
+        """The same at poses (K, 3) with the steps, and the first pose fixed."""
+        ends = np.array([(step.i, step.j) for step in steps], np.int64).reshape(-1, 2)
+        z = np.array([step.pose for step in steps]).reshape(-1, 3)
+        covariances = np.array([step.covariance for step in steps]).reshape(-1, 3, 3)
+        a, b = poses[ends[:, 0]], poses[ends[:, 1]]
+        J = np.concatenate(relative_jacobians(a, b), -1)
+        W = np.linalg.inv(covariances)
+        blocks = np.swapaxes(J, -1, -2) @ W @ J
+        index = (3 * ends[:, :, None] + np.arange(3)).reshape(-1, 6)
+        g = self.gradient.copy()
+        np.add.at(g, index, np.einsum("nki,nkl,nl->ni", J, W, pose_difference(relative(a, b), z)))
+        row, column = np.broadcast_arrays(index[:, :, None], index[:, None, :])
+        fixed = np.zeros(len(g))
+        fixed[:3] = FIXED
+        tied = csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=self.own.shape)
+        return NormalEquations(csr_array(self.own + tied + diags_array(fixed)), self.lines, g)
+
+    def solution(self, near: SuperLU) -> Array:
+        """x (3 K,), by a factor of other normal equations that are near these: a tenth of the time of a factor.
+
+        Conjugate gradients, preconditioned [Golub & Van Loan, Matrix Computations, 11.5]. Where the factor is not near
+        enough, these equations are factored themselves.
+        """
+        H = LinearOperator(self.own.shape, lambda x: self.own @ x - self.lines @ (self.lines.T @ x))
+        M = LinearOperator(self.own.shape, near.solve)
+        x, failed = cg(H, -self.gradient, M=M, rtol=_EXACT, maxiter=_ROUNDS)
+        return factor(self.information()).solve(-self.gradient) if failed else x

@@ -1,0 +1,66 @@
+"""Normal equations of an adjustment, against dense algebra and finite differences."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csc_array, csr_array
+
+from lidarcore.geometry import pose_difference, relative
+from lidarcore.mapping.graph.equations import NormalEquations, Step
+from lidarcore.mapping.graph.recovery import factor
+
+
+def made(rng, stiffness) -> NormalEquations:
+    """Equations of 30 poses and 20 cells, the unknowns as stiff as given (90,)."""
+    lines = rng.normal(0, 0.1, (90, 40)) * (rng.random((90, 40)) < 0.2)
+    own = np.diag(stiffness) + lines @ lines.T
+    return NormalEquations(csr_array(own), csr_array(lines), rng.normal(size=90))
+
+
+@pytest.mark.parametrize("near", [0.5, 2.0])
+def test_a_factor_of_other_equations_solves_these(near):
+    rng = np.random.default_rng(0)
+    stiffness = rng.uniform(1, 1e4, 90)
+    equations = made(rng, stiffness)
+    other = made(rng, stiffness * near ** rng.uniform(-1, 1, 90))
+    dense = equations.own.toarray() - equations.lines.toarray() @ equations.lines.toarray().T
+    truth = np.linalg.solve(dense, -equations.gradient)
+    np.testing.assert_allclose(equations.information().toarray(), dense, atol=1e-12)
+    off = equations.solution(factor(other.information())) - truth
+    assert off @ dense @ off < 1e-12 * (truth @ dense @ truth)
+
+
+def test_where_a_factor_is_not_near_the_solution_is_exact_all_the_same():
+    """As if everything were equally stiff: conjugate gradients alone would take more rounds than they are given."""
+    rng = np.random.default_rng(1)
+    equations = made(rng, np.geomspace(1, 1e8, 90))
+    truth = np.linalg.solve(equations.information().toarray(), -equations.gradient)
+    found = equations.solution(factor(csc_array(np.eye(90))))
+    np.testing.assert_allclose(found, truth, rtol=1e-6, atol=1e-14)
+
+
+def test_steps_add_the_gradient_and_the_curvature_of_their_squared_distances():
+    rng = np.random.default_rng(2)
+    poses = rng.normal(0, [1, 1, 0.5], (3, 3))
+    empty = NormalEquations(csr_array((9, 9)), csr_array((9, 0)), np.zeros(9))
+    roots = [rng.normal(0, 0.1, (3, 3)) for _ in range(2)]
+    steps = [
+        Step(i, j, relative(poses[i], poses[j]) + rng.normal(0, 1e-4, 3), root @ root.T)
+        for (i, j), root in zip([(0, 1), (2, 1)], roots, strict=True)
+    ]
+
+    def whitened(x):
+        at = poses + x.reshape(3, 3)
+        return np.concatenate(
+            [
+                np.linalg.solve(root, pose_difference(relative(at[step.i], at[step.j]), step.pose))
+                for step, root in zip(steps, roots, strict=True)
+            ]
+        )
+
+    J = np.stack([(whitened(d) - whitened(-d)) / 2e-6 for d in 1e-6 * np.eye(9)], -1)
+    found = empty.with_steps(poses, steps)
+    H = found.information().toarray()
+    assert (np.diag(H)[:3] > 1e6 * np.diag(J.T @ J)[:3]).all()  # the first pose is fixed
+    H[:3, :3] = (J.T @ J)[:3, :3]
+    np.testing.assert_allclose(H, J.T @ J, rtol=1e-6, atol=1e-4)
+    np.testing.assert_allclose(found.gradient, J.T @ whitened(np.zeros(9)), rtol=1e-5, atol=1e-6)
