@@ -1,6 +1,7 @@
 """The command `lidarcore`. Heavy imports happen inside the commands, so that help is instant."""
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -118,6 +119,8 @@ def bench() -> None:
 
 def main() -> None:
     """Run the command; what the user can mend is one sentence and exit code 2."""
+    # Matrices are small: a second thread of BLAS only waits for its turn, up to 20 ms, and takes a core meanwhile.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         cli()
     except Exception as error:

@@ -57,8 +57,6 @@ def secured(options: "ServerOptions", host: str) -> "ServerOptions":
 
 def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_browser: bool) -> None:
     """Serve until interrupted. Raises RecordingError or TopicError if the recording cannot be played."""
-    from threadpoolctl import threadpool_limits
-
     from .log import throttle_servers
     from .server import create_app
     from .transport import allow_many_files
@@ -66,7 +64,6 @@ def run(options: "ServerOptions", listening: socket.socket, host: str, *, open_b
     share_arenas()
     allow_many_files()
     throttle_servers()
-    threadpool_limits(1)  # matrices are small: a second thread only waits for its turn, up to 20 ms
     server = uvicorn_server(create_app(options))
     # The terminal was closed: the motor is to be stopped then, too.
     signal.signal(signal.SIGHUP, lambda *_: server.handle_exit(signal.SIGTERM, None))

@@ -1,7 +1,9 @@
 """The command as people run it: processes of their own, and what they leave behind."""
 
+import ast
 import csv
 import json
+import os
 import re
 import subprocess
 import sys
@@ -31,6 +33,22 @@ def test_help_is_instant_and_names_every_command() -> None:
     for command in ("serve", "process", "info", "bench"):
         assert command in result.stdout
         assert run(command, "--help").returncode == 0
+
+
+@pytest.mark.parametrize(("wished", "threads"), [(None, {1}), ("2", {min(2, os.cpu_count() or 1)})])
+def test_matrices_take_one_core_unless_told_otherwise(wished: str | None, threads: set[int]) -> None:
+    """As the libraries themselves tell it, once a command has begun."""
+    begun = "import lidarcore_app.cli.main as command; command.cli = lambda: None; command.main()"
+    asked = "import threadpoolctl, scipy.linalg; print(threadpoolctl.threadpool_info())"
+    environment = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    if wished:
+        environment["OPENBLAS_NUM_THREADS"] = wished
+    command = [sys.executable, "-c", f"{begun}; {asked}"]
+    told = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    libraries = [library for library in ast.literal_eval(told) if library["user_api"] == "blas"]
+    assert {library["num_threads"] for library in libraries} == threads
 
 
 def test_the_file_of_maps_is_said_to_be_a_file() -> None:
