@@ -154,7 +154,7 @@ def _search(
 
     Blocks that were looked into are known better than by their bounds afterwards.
     """
-    turns, half, scores = window.turns, window.half, np.empty((_BLOCK, _BLOCK))
+    turns, half, scores = window.turns, window.half, np.empty((_BLOCK, _BLOCK), np.float32)
     flat, limits = bounds.ravel(), known.ravel()
     best, best_u, best_v, best_turn = -np.inf, 0, 0, 0.0
     for n in order:
