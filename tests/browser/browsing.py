@@ -82,7 +82,8 @@ class Server:
         (emulator,) = (
             child
             for child in psutil.Process(self._process.pid).children(recursive=True)
-            if "lidarcore.rplidar.emulator" in child.cmdline()
+            # One that has just ended has no command line.
+            if child.status() != psutil.STATUS_ZOMBIE and "lidarcore.rplidar.emulator" in child.cmdline()
         )
         emulator.kill()
 

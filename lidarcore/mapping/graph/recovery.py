@@ -19,10 +19,12 @@ class Recovery:
 
     Single blocks come from three columns at a time [Eustice et al. 2006], those on the diagonal from the entries of
     the factor alone [Kaess & Dellaert 2009]: all columns together would take 72 N² bytes.
+
+    factor  of H
     """
 
     def __init__(self, factor: SuperLU) -> None:
-        self._factor = factor
+        self.factor = factor
         self._count = int(factor.shape[0]) // 3  # of the nodes that the factor knows
         self._own: Array | None = None
         self._columns: dict[int, Array] = {}
@@ -67,10 +69,10 @@ class Recovery:
     def _tied(self, i: int, j: int, A: Array, B: Array) -> Array:
         """Covariance (3, 3) of A times what node i is off, with B times what node j is."""
         first, second = (slice(3 * k, 3 * k + 3) for k in (i, j))
-        J = np.zeros((self._factor.shape[0], 3))
+        J = np.zeros((self.factor.shape[0], 3))
         J[first] += A.T
         J[second] += B.T
-        solved = self._factor.solve(J)
+        solved = self.factor.solve(J)
         P: Array = A @ solved[first] + B @ solved[second]
         return (P + P.T) / 2
 
@@ -90,7 +92,7 @@ class Recovery:
     def _column(self, j: int) -> Array:
         """(3 N, 3) covariances of all nodes with one. Who asks for one after the other is given some at once."""
         if j not in self._columns:
-            if len(self._columns) * self._factor.shape[0] > _KEPT:
+            if len(self._columns) * self.factor.shape[0] > _KEPT:
                 self._columns.clear()
             nodes = min(_AHEAD if j - 1 in self._columns else 1, self._count - j)
             for k, columns in enumerate(np.split(self._solved(j, nodes), nodes, axis=1), j):
@@ -104,8 +106,8 @@ class Recovery:
     @property
     def _parts(self) -> tuple[Ints, Ints, Array, Array, Ints]:
         """The factor, as the kernels take it."""
-        L, pivots = self._factor.L, self._factor.U.diagonal()
-        return L.indptr, L.indices, L.data, pivots, self._factor.perm_r
+        L, pivots = self.factor.L, self.factor.U.diagonal()
+        return L.indptr, L.indices, L.data, pivots, self.factor.perm_r
 
 
 @kernel

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
+from scipy.sparse.linalg import SuperLU
 from scipy.special import chdtr
 
 from lidarcore.arrays import Array, Bools, Ints
@@ -74,6 +75,11 @@ class Refined:
         P: Array = first + B @ (shared + turned(own, at[:, 2])) @ B.swapaxes(1, 2)
         return P
 
+    @property
+    def factor(self) -> SuperLU:
+        """Of the information of the poses."""
+        return self._recovery.factor
+
     def placed(self, i: int, j: int) -> UncertainPose:
         """T_i_j with its covariance, as if scans stood where they were placed."""
         return self._recovery.relative(i, j, self.poses)
@@ -96,7 +102,7 @@ def refine(
     since: list[Array] | None = None,
     assumed: float = 0.0,
     known: Known | None = None,
-    noise: Noise = UNMEASURED,
+    before: "Refined | None" = None,
     rounds: int = 12,
 ) -> Refined:
     """Adjust poses (K, 3) that are right to about a cell's `size` m; the first one stays.
@@ -106,19 +112,19 @@ def refine(
     since are times (N,) s from the mean time of each scan's beams until its patches were seen; None: all at once.
     assumed m is the unevenness that the patches' variances contain: it is measured here, and would count twice.
     known tells which parts of the way may be taken to have seen the same surfaces; None: all.
-    noise is what is known of it before it is measured here.
+    before is what they were adjusted to last, which tells the noise and is near where they go now; None: never yet.
     steps tie keyframes by what is known where surfaces say nothing: by odometry or the going on of the motion, and by
     what was seen as well between keyframes that `known` does not join.
     """
     islands = np.zeros(len(poses), np.int64) if islands is None else islands
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
     surfaces = Surfaces(_observations(scans, since, assumed**2), islands, size, known)
-    poses, before, near = poses.copy(), np.inf, None
+    noise, near = (before.noise, before.factor) if before else (UNMEASURED, None)
+    poses, larger = poses.copy(), np.inf
     for number in range(rounds):
         equations, groups = normal_equations(surfaces, poses, noise)
         equations = equations.with_steps(poses, steps)
-        near = near or factor(equations.information())
-        step = equations.solution(near)
+        step, near = equations.solution(near)
         poses = poses + step.reshape(-1, 3)
         poses[:, 2] = wrap(poses[:, 2])
         taken, noise = noise, _measured(groups, len(poses))
@@ -126,9 +132,9 @@ def refine(
         if size < _SETTLED and _is_alike(taken, noise, groups):
             break
         # Cells are cut anew in each round, which alone moves poses of a large building by some tenths of a deviation.
-        if number >= _MEASURED and size >= before:
+        if number >= _MEASURED and size >= larger:
             break
-        before = size
+        larger = size
     equations, _ = normal_equations(surfaces, poses, noise)
     recovery = Recovery(factor(equations.with_steps(poses, steps).information()))
     speeds = speeds_left(surfaces, poses, noise)

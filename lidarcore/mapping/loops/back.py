@@ -8,7 +8,7 @@ from lidarcore.arrays import Array
 from lidarcore.geometry import HERE, UncertainPose, compose, pose_difference, relative
 from lidarcore.mapping.graph.known import Known, known, known_besides, near_unknown
 from lidarcore.mapping.graph.pose_graph import PoseGraph
-from lidarcore.mapping.graph.refinement import UNMEASURED, Refined, refine
+from lidarcore.mapping.graph.refinement import Refined, refine
 from lidarcore.mapping.loops.closure import LoopFinder
 from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.islands import Islands, moved
@@ -45,7 +45,7 @@ class BackEnd:
         self._steps = Steps(self.graph)
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
-        self._noise = UNMEASURED  # of surfaces
+        self._last: Refined | None = None
 
     def add(self, tracked: Tracked) -> None:
         """Append a keyframe, and bend the map if it closes loops; or look again from where the last one was taken.
@@ -161,7 +161,7 @@ class BackEnd:
 
     def _refined(self, parts: Known) -> Refined:
         match, sweeps = self._settings.front.match, [keyframe.sweep for keyframe in self.keyframes.values()]
-        refined = refine(
+        self._last = refine(
             [keyframe.patches for keyframe in self.keyframes.values()],
             self.graph.poses,
             self._steps.besides(parts),
@@ -171,10 +171,9 @@ class BackEnd:
             [seen_since(keyframe.scan, keyframe.patches) for keyframe in self.keyframes.values()],
             match.unevenness,
             parts,
-            self._noise,
+            self._last,
         )
-        self._noise = refined.noise
-        return refined
+        return self._last
 
     def _join(self, k: int) -> int:
         """Move the newest island to where node k of it was found. Returns how many loops tie it there: 0 or 1."""

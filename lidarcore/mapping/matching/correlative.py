@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lidarcore.arrays import Array, Ints
+from lidarcore.arrays import Array, Ints, Singles
 from lidarcore.compiled import finite_kernel, kernel
 from lidarcore.geometry import wrap
 from lidarcore.geometry.kernels import rotate
@@ -101,7 +101,7 @@ def arm(points: Array) -> float:
     return float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 80))
 
 
-def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Array]:
+def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Singles]:
     """Corner (2,) m of a grid around the points, and its scores: 1 at a point, falling off like a Gaussian.
 
     The outermost blocks are 0: what lies beyond the grid scores as they do.
@@ -115,7 +115,7 @@ def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Array]:
 
 
 @finite_kernel
-def _splat(points: Array, blur: float, grid: Array) -> None:
+def _splat(points: Array, blur: float, grid: Singles) -> None:
     """Largest of the Gaussians around the points, all in cells."""
     reach = int(np.ceil(_REACH * blur))
     along, across = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
@@ -131,7 +131,7 @@ def _splat(points: Array, blur: float, grid: Array) -> None:
 
 
 @finite_kernel
-def _blocks(fine: Array) -> Array:
+def _blocks(fine: Singles) -> Singles:
     """Largest score in each block and its next neighbours: what a point of the block can meet within a block's side."""
     blocks = np.zeros((fine.shape[0] // _BLOCK, fine.shape[1] // _BLOCK), np.float32)
     for i in range(fine.shape[0]):
@@ -148,7 +148,7 @@ def _blocks(fine: Array) -> Array:
 
 @kernel
 def _search(
-    fine: Array, cells: Ints, bounds: Array, known: Array, order: Ints, others: Array, window: _Window
+    fine: Singles, cells: Ints, bounds: Array, known: Array, order: Ints, others: Array, window: _Window
 ) -> tuple[float, float, float]:
     """Best shift, in cells, and turn that is not close to one of others (E, 3): looks into blocks in the order given.
 
@@ -192,7 +192,7 @@ def _cells(points: Array, window: _Window) -> Ints:
 
 
 @kernel
-def _bounds(blocks: Array, cells: Ints, window: _Window) -> Array:
+def _bounds(blocks: Singles, cells: Ints, window: _Window) -> Array:
     """(T, A, B) what no shift in a block of shifts exceeds, for each turn and block."""
     turns, half = window.turns, window.half
     bounds = np.zeros((len(turns), 2 * half[0] + 1, 2 * half[1] + 1))
@@ -210,7 +210,7 @@ def _bounds(blocks: Array, cells: Ints, window: _Window) -> Array:
 
 
 @kernel
-def _sum_scores(fine: Array, cells: Ints, u: int, v: int, scores: Array) -> None:
+def _sum_scores(fine: Singles, cells: Ints, u: int, v: int, scores: Singles) -> None:
     """Sums of the scores of points in cells (N, 2), for each shift in the block from (u, v) on; 0 beyond the grid."""
     scores[:] = 0.0
     for k in range(len(cells)):
