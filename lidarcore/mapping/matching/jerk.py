@@ -97,7 +97,7 @@ class Drive(NamedTuple):
     noise      times the variances of the places, which is what explains them best: poses of scans on one map share its
                errors, which are no noise from one to the next; one factor, as the same surfaces tell all dimensions
     densities  (D, Z, 3) of the jerk, those that explain any of the places
-    shares     (D, 3) how often each of these explains them best
+    shares     (D, 3) how often each of these explains them best; 0 where it never does
     """
 
     noise: float
@@ -107,14 +107,15 @@ class Drive(NamedTuple):
     @classmethod
     def of(cls, given: Window) -> "Drive":
         """By some of its times, maximum likelihood of noise and jerk: one of them alone takes the other's place."""
-        some = np.arange(0, len(given.told), -(-len(given.told) // _ENOUGH))
-        likelihoods = [_most_likely(given, some, noise, STEADY)[0] for noise in _NOISES]
+        times = np.arange(0, len(given.told), -(-len(given.told) // _ENOUGH))
+        likelihoods = [_most_likely(given, times, noise, STEADY)[0] for noise in _NOISES]
         noise = float(_NOISES[int(np.argmax(likelihoods))])
         among = kinds(given.lasts)
-        shares = _most_likely(given, some, noise, among)[1]
+        shares = _most_likely(given, times, noise, among)[1]
         # Of drives that are looked at in part, the rest may be jerkier still: the steady densities stay.
-        counts = (shares > _NEVER).any(axis=1) | (np.arange(len(shares)) < len(JERKS))
-        return cls(noise, among.densities[counts], shares[counts])
+        counts = (shares > _NEVER) | (np.arange(len(shares)) < len(JERKS))[:, None]
+        some = counts.any(axis=1)
+        return cls(noise, among.densities[some], np.where(counts, shares, 0.0)[some])
 
 
 def _most_likely(given: Window, some: Ints, noise: float, among: Kinds) -> tuple[float, Array]:
@@ -145,5 +146,5 @@ def estimated(given: Window, drive: Drive) -> tuple[Array, Array, Array]:
     """
     T = len(given.told)
     rates, shared, spread = np.empty((T, 2, 3)), np.empty((T, 2, 3)), np.empty((T, 3, 2, 2))
-    mix(given, drive.noise, Densities(drive.densities, np.log(drive.shares)), rates, spread, shared)
+    mix(given, drive.noise, Densities(drive.densities, drive.shares), rates, spread, shared)
     return rates, spread, shared

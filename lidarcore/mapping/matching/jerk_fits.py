@@ -37,7 +37,7 @@ class Window(NamedTuple):
 
 class Densities(NamedTuple):
     """D densities of the jerk in each stretch of time, (D, Z, 3) m/s², m/s², rad/s² within a second; and how often each
-    is the one, as logarithms of shares (D, 3)."""
+    is the one, shares (D, 3), some of them 0."""
 
     jerks: Array
     shares: Array
@@ -65,8 +65,10 @@ def mix(window: Window, noise: float, of: Densities, rates: Array, spread: Array
         for d in range(3):
             best = -np.inf
             for n in range(D):
-                _fit(window, k, d, noise, of.jerks[n, :, d], S, X, found[n])
-                found[n, _EVIDENCE] += of.shares[n, d]
+                found[n], found[n, _EVIDENCE] = 0.0, -np.inf
+                if of.shares[n, d] > 0:
+                    _fit(window, k, d, noise, of.jerks[n, :, d], S, X, found[n])
+                    found[n, _EVIDENCE] += np.log(of.shares[n, d])
                 best = max(best, found[n, _EVIDENCE])
             weights = np.exp(found[:, _EVIDENCE] - best)
             weights /= weights.sum()
