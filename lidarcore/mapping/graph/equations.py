@@ -27,7 +27,9 @@ class Step:
 
 
 class NormalEquations(NamedTuple):
-    """H x = -gradient of K poses, where H = own - lines lines^T, less the lines of cells that several keyframes saw.
+    """H x = -gradient, for corrections x (3 K,) of K poses.
+
+    H = own - lines lines^T: the lines through cells, unknown as well, are eliminated.
 
     own       (3 K, 3 K) sparse
     lines     (3 K, 2 L) sparse
@@ -39,7 +41,7 @@ class NormalEquations(NamedTuple):
     gradient: Array
 
     def information(self) -> csc_array:
-        """H (3 K, 3 K), in which all keyframes that saw a surface are tied to each other: nearly dense in a room."""
+        """H (3 K, 3 K), which ties all keyframes that saw a surface to each other: nearly dense in a room."""
         return csc_array(self.own - self.lines @ self.lines.T)
 
     def with_steps(self, poses: Array, steps: list[Step]) -> "NormalEquations":
@@ -61,10 +63,10 @@ class NormalEquations(NamedTuple):
         return NormalEquations(csr_array(self.own + tied + diags_array(fixed)), self.lines, g)
 
     def solution(self, near: SuperLU | None) -> tuple[Array, SuperLU]:
-        """x (3 K,), and a factor that is near these equations: the one of others that is given, or else their own.
+        """x (3 K,), and a factor for the next equations: the given one, of equations `near` these, or their own.
 
-        Conjugate gradients, preconditioned with a factor of equations that are near these, take a tenth of the time of
-        a factor [Golub & Van Loan, Matrix Computations, 11.5]. Where it is not near enough, these are factored.
+        Conjugate gradients, preconditioned with a factor of equations that are near, take a tenth of the time of a new
+        factor [Golub & Van Loan, Matrix Computations, 11.5]. Where it is not near enough, these are factored.
         """
         if near is not None and near.shape == self.own.shape:
             H = LinearOperator(self.own.shape, lambda x: self.own @ x - self.lines @ (self.lines.T @ x))
