@@ -195,6 +195,22 @@ def test_what_scatters_about_a_steady_way_is_noise_and_no_jerk():
     assert 0.85 < mean < 1.15
 
 
+@pytest.mark.parametrize("never", [0, 4, 8])
+def test_a_density_that_never_is_the_one_counts_for_nothing_in_that_dimension(never):
+    """Beside those that are, one at a time, as if it were not there; the others keep their shares."""
+    given = around(np.random.default_rng(4).normal(0, 0.01, (5, 7, 3)))
+    shares = np.full((len(JERKS), 3), 1 / len(JERKS))
+    rest = np.arange(len(JERKS)) != never
+    shares[never, 1] = 0.0
+    found = estimated(given, Drive(1.0, STEADY.densities, shares))
+    without = estimated(given, Drive(1.0, STEADY.densities[rest], shares[rest]))
+    usual = estimated(given, Drive(1.0, STEADY.densities, np.full(shares.shape, 1 / len(JERKS))))
+    for one, two, three, axis in zip(found, without, usual, (2, 1, 2), strict=True):
+        np.testing.assert_allclose(one.take(1, axis), two.take(1, axis), rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(one.take([0, 2], axis), three.take([0, 2], axis), rtol=1e-9, atol=1e-15)
+        assert not np.allclose(one.take(1, axis), three.take(1, axis), rtol=1e-4, atol=0)
+
+
 def test_a_place_that_is_not_told_says_nothing():
     rng = np.random.default_rng(2)
     places = rng.normal(0, 0.002, (5, 7, 3))

@@ -120,7 +120,7 @@ def refine(
     sweeps = np.zeros((len(poses), 3, 3)) if sweeps is None else sweeps
     surfaces = Surfaces(_observations(scans, since, assumed**2), islands, size, known)
     noise, near = (before.noise, before.factor) if before else (UNMEASURED, None)
-    poses, larger = poses.copy(), np.inf
+    poses, size_before = poses.copy(), np.inf
     for number in range(rounds):
         equations, groups = normal_equations(surfaces, poses, noise)
         equations = equations.with_steps(poses, steps)
@@ -132,9 +132,9 @@ def refine(
         if size < _SETTLED and _is_alike(taken, noise, groups):
             break
         # Cells are cut anew in each round, which alone moves poses of a large building by some tenths of a deviation.
-        if number >= _MEASURED and size >= larger:
+        if number >= _MEASURED and size >= size_before:
             break
-        larger = size
+        size_before = size
     equations, _ = normal_equations(surfaces, poses, noise)
     recovery = Recovery(factor(equations.with_steps(poses, steps).information()))
     speeds = speeds_left(surfaces, poses, noise)

@@ -45,7 +45,7 @@ class BackEnd:
         self._steps = Steps(self.graph)
         self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
         self._islands = Islands(self.graph, self.keyframes)
-        self._last: Refined | None = None
+        self._last: Refined | None = None  # to which all keyframes were adjusted
 
     def add(self, tracked: Tracked) -> None:
         """Append a keyframe, and bend the map if it closes loops; or look again from where the last one was taken.

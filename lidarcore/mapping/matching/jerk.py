@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
-from lidarcore.mapping.matching.jerk_fits import Densities, Window, evidences, mix
+from lidarcore.mapping.matching.jerk_fits import Window, evidences, mix
 from lidarcore.mapping.matching.white_jerk import STRETCHES, wander
 
 JERKS = np.array([0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
@@ -146,5 +146,5 @@ def estimated(given: Window, drive: Drive) -> tuple[Array, Array, Array]:
     """
     T = len(given.told)
     rates, shared, spread = np.empty((T, 2, 3)), np.empty((T, 2, 3)), np.empty((T, 3, 2, 2))
-    mix(given, drive.noise, Densities(drive.densities, drive.shares), rates, spread, shared)
+    mix(given, drive.noise, drive.densities, drive.shares, rates, spread, shared)
     return rates, spread, shared

@@ -35,14 +35,6 @@ class Window(NamedTuple):
     lasts: Array
 
 
-class Densities(NamedTuple):
-    """D densities of the jerk in each stretch of time, (D, Z, 3) m/s², m/s², rad/s² within a second; and how often each
-    is the one, shares (D, 3), some of them 0."""
-
-    jerks: Array
-    shares: Array
-
-
 @kernel
 def evidences(window: Window, some: Ints, noise: float, jerks: Array, found: Array) -> None:
     """Writes log evidences (D, S, 3) of `noise` times the variances and of densities (D, Z, 3) at some (S,) times."""
@@ -56,19 +48,24 @@ def evidences(window: Window, some: Ints, noise: float, jerks: Array, found: Arr
 
 
 @kernel
-def mix(window: Window, noise: float, of: Densities, rates: Array, spread: Array, shared: Array) -> None:
+def mix(
+    window: Window, noise: float, jerks: Array, shares: Array, rates: Array, spread: Array, shared: Array
+) -> None:
     """Writes speeds and accelerations (T, 2, 3) with covariances (T, 3, 2, 2), and theirs (T, 2, 3) with the error of
-    the place at the time itself: each density counts as it explains the places."""
-    K, D = window.told.shape[2], len(of.jerks)
+    the place at the time itself: each of the densities (D, Z, 3) counts as it explains the places.
+
+    shares (D, 3) tell how often each is the one; what is 0 is not looked at.
+    """
+    K, D = window.told.shape[2], len(jerks)
     S, X, found = np.empty((K, K)), np.empty((K, 6)), np.empty((D, _FOUND))
     for k in range(len(window.told)):
         for d in range(3):
             best = -np.inf
             for n in range(D):
                 found[n], found[n, _EVIDENCE] = 0.0, -np.inf
-                if of.shares[n, d] > 0:
-                    _fit(window, k, d, noise, of.jerks[n, :, d], S, X, found[n])
-                    found[n, _EVIDENCE] += np.log(of.shares[n, d])
+                if shares[n, d] > 0:
+                    _fit(window, k, d, noise, jerks[n, :, d], S, X, found[n])
+                    found[n, _EVIDENCE] += np.log(shares[n, d])
                 best = max(best, found[n, _EVIDENCE])
             weights = np.exp(found[:, _EVIDENCE] - best)
             weights /= weights.sum()
