@@ -97,7 +97,7 @@ function watchSheet() {
     look();
   };
   const sizes = new ResizeObserver(renew);
-  for (const id of ["stage", "legend"]) sizes.observe($(id));
+  for (const id of ["stage", "legend", "banner"]) sizes.observe($(id)); // which hides the welcome
   new MutationObserver(renew).observe($("stage"), { childList: true });
 }
 

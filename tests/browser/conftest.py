@@ -1,6 +1,7 @@
 """Servers and browsers for the tests of the page."""
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 from browsing import CHROMIUM, FLAGS, Server, Visitor
@@ -72,3 +73,12 @@ def visit(
 def visitor(visit: Callable[..., Visitor]) -> Visitor:
     """One browser with the page open."""
     return visit().open()
+
+
+@pytest.fixture
+def own_server(tmp_path: Path) -> Iterator[Server]:
+    """A server for one test alone, which may kill it."""
+    server = Server(tmp_path)
+    server.start()
+    yield server
+    server.kill()

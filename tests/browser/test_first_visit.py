@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from browsing import Visitor
+from browsing import Server, Visitor
 from playwright.sync_api import expect
 from waiting import wait_until
 
@@ -81,6 +81,21 @@ def test_a_map_is_built(newcomer: Visitor) -> None:
 def test_the_strip_is_closed(newcomer: Visitor) -> None:
     newcomer.page.get_by_role("button", name="Close the first steps").click()
     closed(newcomer)
+
+
+def test_it_makes_way_for_what_must_be_read_first(own_server: Server, visit: Callable[..., Visitor]) -> None:
+    """As at the first start, when kernels are compiled and nothing is seen yet."""
+    visitor = visit(1400, 900, first_visit=True, at=own_server)
+    visitor.tolerated += ["net::ERR_", "WebSocket", "Failed to fetch"]
+    page = visitor.open().page
+    strip, banner = page.get_by_role("complementary", name="First steps"), page.locator("#banner")
+    expect(strip).to_be_visible()
+    own_server.kill()
+    expect(banner).to_contain_text("Connection lost")
+    expect(strip).to_be_hidden()
+    own_server.start()
+    expect(banner).to_be_hidden()
+    expect(strip).to_be_visible()
 
 
 def test_on_a_phone_it_leaves_view_and_tabs_free_and_its_buttons_are_easy_to_tap(

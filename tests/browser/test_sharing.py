@@ -1,8 +1,7 @@
 """One state for all: links, further browsers, and connections that break."""
 
 import re
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from urllib.parse import urlsplit
 
 import pytest
@@ -116,15 +115,6 @@ def test_second_browser_sees_the_same(server: Server, visit: Callable[..., Visit
     assert first.page.inner_text(table) == second.page.inner_text(table)
     first.page.locator("#corner-table tbody button").nth(1).click()
     expect(second.page.locator("#corner-table tbody tr").nth(1)).to_have_class("selected")
-
-
-@pytest.fixture
-def own_server(tmp_path: Path) -> Iterator[Server]:
-    """A server for one test alone, which may kill it."""
-    server = Server(tmp_path)
-    server.start()
-    yield server
-    server.kill()
 
 
 @pytest.mark.long
