@@ -98,6 +98,21 @@ def test_it_makes_way_for_what_must_be_read_first(own_server: Server, visit: Cal
     expect(strip).to_be_visible()
 
 
+def test_nothing_is_explained_before_anything_is_seen(visit: Callable[..., Visitor]) -> None:
+    visitor, is_heard = visit(1400, 900), False
+    page = visitor.page
+    page.route_web_socket("**", lambda socket: socket.connect_to_server() if is_heard else None)
+    page.goto(visitor.server.url)
+    expect(page.locator("#setting-extraction-min_points")).to_be_attached()
+    legend, scale = page.get_by_text("Legend", exact=True), page.get_by_role("img", name="Scale")
+    expect(legend).to_be_hidden()
+    expect(scale).to_be_hidden()
+    is_heard = True
+    visitor.open()
+    expect(legend).to_be_visible()
+    expect(scale).to_be_visible()
+
+
 def test_on_a_phone_it_leaves_view_and_tabs_free_and_its_buttons_are_easy_to_tap(
     visit: Callable[..., Visitor],
 ) -> None:
