@@ -20,7 +20,7 @@ from ..pipeline.frame import Frame
 from ..pipeline.runtime import Runtime
 from ..pipeline.slam_run import Localization
 from ..sources.source import DeviceStatus
-from .stream import Hub
+from .stream.hub import Hub
 
 LATENCY = (0.001, 0.002, 0.003, 0.005, 0.0075, 0.01, 0.02, 0.05, 0.1, 1.0)  # s
 WORK = (2e-5, 5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2, 1e-1)  # s

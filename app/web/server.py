@@ -12,7 +12,7 @@ from starlette.types import Receive, Scope, Send
 from ..scene.palette import stylesheet
 from . import openapi, problems
 from .metrics import metrics_router
-from .queries import check_query
+from .requests.queries import check_query
 from .routes import (
     calibration,
     frame,

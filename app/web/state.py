@@ -30,7 +30,7 @@ from ..sources.live import DeviceOptions, Taps, connected_or_emulated
 from ..sources.recorded import RecordingSource
 from ..sources.source import Source
 from .metrics import Metrics
-from .stream import Hub
+from .stream.hub import Hub
 from .viser_mount import ViserMount
 
 MAP_FILE = "landmarks.db"

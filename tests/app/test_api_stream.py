@@ -10,13 +10,13 @@ from itertools import islice
 from pathlib import Path
 
 import httpx
-import lidarcore_app.web.stream
+import lidarcore_app.web.stream.mailbox
 import numpy as np
 import pytest
 import websockets
 from lidarcore_app.jobs.maps.wall_writer import grid_to_stored
 from lidarcore_app.pipeline.newest import NewestScan
-from lidarcore_app.web.stream import Mailbox
+from lidarcore_app.web.stream.mailbox import Mailbox
 from lidarcore_app.web.transport import SEND_BUFFER
 from serving import CORNERS, ROOT, Json, Server, assert_problem, strict_json, write_room
 from waiting import PATIENCE
@@ -139,7 +139,9 @@ def test_every_change_is_told_to_every_client(server: Server, room: Path) -> Non
 
 
 def test_a_mailbox_holds_one_frame_the_newest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(lidarcore_app.web.stream, "frame_text", lambda frame, points: json.dumps(frame))
+    monkeypatch.setattr(
+        lidarcore_app.web.stream.mailbox, "frame_text", lambda frame, points: json.dumps(frame)
+    )
 
     async def scenario() -> None:
         mailbox, frames = Mailbox(points=False), [{"n": n} for n in range(5)]

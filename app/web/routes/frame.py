@@ -12,12 +12,12 @@ from lidarcore.clusters import CLUSTERERS, cluster
 from ...errors import NotFoundError
 from ...pipeline.frame import Frame
 from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns, csv_text, values
+from ..answers.downloads import file_of
+from ..answers.serializers import clusters_json, corners_json, frame_text, segments_json
 from ..dependencies import CurrentFrame, Server
-from ..downloads import file_of
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import ClusterJson, CornerJson, FrameJson, SegmentJson
-from ..serializers import clusters_json, corners_json, frame_text, segments_json
 
 router = APIRouter(tags=["frame"], responses=documented(404, 422, 503))
 

@@ -20,8 +20,8 @@ from lidarcore.mapping.walls import WallTable
 from ...errors import NotFoundError, NotYetError
 from ...jobs.maps.names import stem_of
 from ...pipeline.runtime import Runtime
+from ..answers.downloads import file_of
 from ..dependencies import Server
-from ..downloads import file_of
 from ..problems import documented
 from ..state import State
 

@@ -14,11 +14,11 @@ from lidarcore.landmarks import MAX_ID, Landmark, LandmarkMap, Metric, Neighbour
 from ...errors import NotFoundError
 from ...jobs.maps.names import stem_of
 from ...jobs.maps.store import LandmarkStore
+from ..answers.downloads import file_of
 from ..dependencies import Server
-from ..downloads import file_of
-from ..map_queries import MOST, USUAL, Limit, Metres, Region, Which
 from ..openapi import formats
 from ..problems import documented, encode
+from ..requests.map_queries import MOST, USUAL, Limit, Metres, Region, Which
 from ..schemas import Finite
 
 router = APIRouter(prefix="/landmarks", tags=["landmarks"], responses=documented(404, 422, 503))

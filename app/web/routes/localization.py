@@ -17,13 +17,13 @@ from ...pipeline.slam_run import Localization
 from ...pipeline.tables import csv_text
 from ...pipeline.trails import TrackedPose
 from ...records import record
+from ..answers.downloads import file_of
+from ..answers.serializers import pose_json
 from ..dependencies import Server
-from ..downloads import file_of
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
 from ..schemas import Body as Model
 from ..schemas import Coordinate, Matrix3, Number, OdometryPose, Row3
-from ..serializers import pose_json
 
 router = APIRouter(tags=["localization"], responses=documented(422))
 

@@ -13,8 +13,8 @@ from lidarcore.mapping.walls import MOST_WALLS, JointWalls
 from ...errors import NotFoundError
 from ...jobs.maps.names import called
 from ..dependencies import Server
-from ..places import MeasuredFeatureJson, Place, found_at
 from ..problems import ProblemError, documented
+from ..requests.places import MeasuredFeatureJson, Place, found_at
 from ..state import State
 from .grid import asked_session
 

@@ -15,8 +15,8 @@ from lidarcore.evaluation.repeatability.summary import Summary
 from lidarcore.evaluation.repeatability.tables import to_csv
 
 from ...errors import NotFoundError
+from ..answers.downloads import file_of
 from ..dependencies import Server
-from ..downloads import file_of
 from ..openapi import formats
 from ..problems import documented, encode
 from ..schemas import Pair

@@ -18,7 +18,7 @@ from ...sources.source import Source
 from ..dependencies import Server
 from ..openapi import formats
 from ..problems import documented
-from ..source_bodies import SIMULATION_SETTINGS, Choice, Recording, Simulation, Step, Transport
+from ..requests.source_bodies import SIMULATION_SETTINGS, Choice, Recording, Simulation, Step, Transport
 
 router = APIRouter(prefix="/source", tags=["source"])
 

@@ -14,11 +14,11 @@ from ...errors import NotFoundError
 from ...jobs.maps.store import LandmarkStore
 from ...jobs.maps.wall_writer import from_stored
 from ...pipeline.runtime import Runtime
+from ..answers.wall_json import WallJson, wall_rows
 from ..dependencies import Server
-from ..map_queries import USUAL, Limit
 from ..problems import documented, encode
+from ..requests.map_queries import USUAL, Limit
 from ..schemas import Finite
-from ..wall_json import WallJson, wall_rows
 
 router = APIRouter(tags=["localization"], responses=documented(404, 422, 503))
 

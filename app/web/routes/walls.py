@@ -15,13 +15,13 @@ from lidarcore.mapping.export import walls_csv, walls_geojson
 from lidarcore.mapping.walls import WallTable, along, distances, in_box, nearest
 
 from ...jobs.maps.names import stem_of
+from ..answers.downloads import file_of
+from ..answers.wall_json import WallJson, wall_rows
 from ..dependencies import Server
-from ..downloads import file_of
-from ..map_queries import Metres, Region
 from ..openapi import formats
 from ..problems import ProblemError, documented, encode
+from ..requests.map_queries import Metres, Region
 from ..schemas import Finite
-from ..wall_json import WallJson, wall_rows
 from .grid import asked_session, running_walls
 
 Mask = NDArray[np.bool_]

@@ -9,7 +9,7 @@ from typing_extensions import TypedDict
 
 from lidarcore.mapping.walls import Walls, WallTable, corner_ends
 
-from .schemas import Matrix, Pair
+from ..schemas import Matrix, Pair
 
 SAME = 1e-6  # m, between ends that are the same corner
 

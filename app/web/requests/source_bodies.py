@@ -8,8 +8,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, TypeAdapter
 
 from lidarcore.simulation.settings import SimulationSettings
 
-from .schemas import Body as Model
-from .schemas import Number, StrictBody
+from ..schemas import Body as Model
+from ..schemas import Number, StrictBody
 
 Index = Annotated[int, Field(ge=0, le=10**9, description="number of the scan, from 0")]
 

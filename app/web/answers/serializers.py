@@ -12,12 +12,12 @@ from lidarcore import Array, Features
 from lidarcore.clusters import Clusters
 from lidarcore.geometry import squared_mahalanobis
 
-from ..pipeline.frame import Frame
-from ..pipeline.slam_run import Localization
-from ..pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns
-from ..records import record
-from ..scene.point_colours import colour_scale
-from .schemas import (
+from ...pipeline.frame import Frame
+from ...pipeline.slam_run import Localization
+from ...pipeline.tables import CORNER_COLUMNS, SEGMENT_COLUMNS, Columns
+from ...records import record
+from ...scene.point_colours import colour_scale
+from ..schemas import (
     ClusterJson,
     CornerJson,
     FrameJson,

@@ -4,7 +4,7 @@ from urllib.parse import quote
 
 from starlette.responses import Response
 
-from .openapi import MEDIA_TYPES
+from ..openapi import MEDIA_TYPES
 
 
 def file_of(content: str | bytes, format: str, stem: str) -> Response:

@@ -13,9 +13,9 @@ from lidarcore.geometry import act
 from lidarcore.mapping.measure import Feature
 from lidarcore.mapping.walls import JointWalls
 
-from ..errors import NotFoundError
-from ..pipeline.frame import Frame
-from .schemas import Pair
+from ...errors import NotFoundError
+from ...pipeline.frame import Frame
+from ..schemas import Pair
 
 SNAP = 0.3  # m; what is farther away was not meant
 

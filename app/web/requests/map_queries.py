@@ -8,8 +8,8 @@ from pydantic import Field
 
 from lidarcore.landmarks import MAX_COORDINATE, MAX_ID, Box, Circle, Filter
 
-from .problems import ProblemError
-from .schemas import Finite
+from ..problems import ProblemError
+from ..schemas import Finite
 
 MOST, USUAL = 1000, 100  # landmarks, or states, of a page
 Metres = Annotated[float, Field(ge=-MAX_COORDINATE, le=MAX_COORDINATE, allow_inf_nan=False)]

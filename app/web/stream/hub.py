@@ -1,4 +1,4 @@
-"""Newest wins: each client of the stream has room for one state, the walls and one frame, and never gets an old one."""
+"""Frames, walls and changes of the map from the threads that make them to the clients that watch."""
 
 import asyncio
 from collections.abc import Callable
@@ -10,19 +10,18 @@ from pydantic_core import to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from lidarcore.errors import LocalizationError
-from lidarcore.landmarks import Landmark
 from lidarcore.mapping.walls import WallTable
 
-from ..errors import explained
-from ..jobs.maps.maker import MapMaker
-from ..jobs.maps.session_writer import MapChange
-from ..jobs.maps.store import LandmarkStore
-from ..jobs.recorder import AsyncRecorder
-from ..pipeline.frame import Frame
-from ..pipeline.runtime import Runtime
-from .schemas import OdometryPose
-from .serializers import frame_text
-from .wall_json import walls_text
+from ...errors import explained
+from ...jobs.maps.maker import MapMaker
+from ...jobs.maps.session_writer import MapChange
+from ...jobs.maps.store import LandmarkStore
+from ...jobs.recorder import AsyncRecorder
+from ...pipeline.frame import Frame
+from ...pipeline.runtime import Runtime
+from ..answers.wall_json import walls_text
+from ..schemas import OdometryPose
+from .mailbox import Mailbox, typed
 
 TICK = 0.5  # s
 PENALTY = 0.01  # s until the next message is read of a client whose last one was not taken
@@ -32,78 +31,6 @@ class OdometryMessage(OdometryPose):
     """What a client may send: a pose, with its type."""
 
     type: Literal["odometry"]
-
-
-class MapChanges:
-    """Changes of the map still to be sent, the newest of each landmark; those of a session before no longer matter."""
-
-    def __init__(self) -> None:
-        self._session: int | None = None
-        self._landmarks: dict[int | None, Landmark] = {}
-        self._removed: set[int] = set()
-
-    def __bool__(self) -> bool:
-        return self._session is not None
-
-    def add(self, change: MapChange) -> None:
-        if change.session != self._session:
-            self._session = change.session
-            self._landmarks.clear()
-            self._removed.clear()
-        for id_ in change.removed:
-            self._landmarks.pop(id_, None)
-        self._removed.update(change.removed)
-        self._landmarks.update((landmark.id, landmark) for landmark in change.landmarks)
-
-    def text(self) -> str:
-        """The changes as JSON."""
-        rows = list(self._landmarks.values())
-        return to_json({"session": self._session, "changed": rows, "removed": sorted(self._removed)}).decode()
-
-
-class Mailbox:
-    """What one client has still to be sent."""
-
-    def __init__(self, points: bool) -> None:
-        self._points = points
-        self._news = asyncio.Event()
-        self._state_changed = False
-        self._frame: Frame | None = None
-        self._walls: str | None = None
-        self._changes = MapChanges()
-
-    def put_change(self, change: MapChange) -> None:
-        self._changes.add(change)
-        self._news.set()
-
-    def put_state(self) -> None:
-        self._state_changed = True
-        self._news.set()
-
-    def put_walls(self, text: str) -> None:
-        self._walls = text
-        self._news.set()
-
-    def put_frame(self, frame: Frame) -> None:
-        self._frame = frame
-        self._news.set()
-
-    async def take(self, state: Callable[[], str]) -> tuple[list[str], Frame | None]:
-        """Wait for news; the messages to send now, made at this moment, and the frame among them."""
-        await self._news.wait()
-        self._news.clear()
-        changed, self._state_changed = self._state_changed, False
-        frame, self._frame = self._frame, None
-        walls, self._walls = self._walls, None
-        messages = [state()] if changed else []
-        if self._changes:
-            changes, self._changes = self._changes, MapChanges()
-            messages.append(_message("landmarks", changes.text()))
-        if walls is not None:
-            messages.append(_message("walls", walls))
-        if frame is not None:
-            messages.append(_message("frame", frame_text(frame, self._points)))
-        return messages, frame
 
 
 class Hub:
@@ -155,7 +82,7 @@ class Hub:
             "sessions_revision": self._landmarks.atlas.revision,
             "making_revision": self._map_maker.revision,
         }
-        return _message("state", to_json(state).decode())
+        return typed("state", to_json(state).decode())
 
     async def serve(self, websocket: WebSocket, points: bool) -> None:
         """Feed one accepted client until it goes."""
@@ -240,9 +167,4 @@ def _walls_of(frame: Frame) -> WallTable | None:
 
 def _refusal(detail: str) -> str:
     problem = {"title": "Message ignored", "detail": detail}
-    return _message("error", to_json(problem).decode())
-
-
-def _message(kind: str, json: str) -> str:
-    """A JSON object with its type as first member; nothing is encoded twice."""
-    return f'{{"type":"{kind}",{json[1:]}'
+    return typed("error", to_json(problem).decode())
