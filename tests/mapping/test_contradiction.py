@@ -33,7 +33,8 @@ def test_what_fits_elsewhere_by_chance_is_not_believed(off, inliers, is_chance):
     seen = patches(scan, SETTINGS.front.match)
     local = LocalMap(SETTINGS.front)
     local.add(scan, seen)
-    assert local.is_chance(seen, GUESS, Registration(np.array(off), 1e4 * np.eye(3), inliers)) == is_chance
+    found = Registration(np.array(off), 1e4 * np.eye(3), inliers)
+    assert local.is_chance(seen, local.expects(GUESS), found) == is_chance
 
 
 def steps_of_the_front_end(scans, reference):

@@ -21,6 +21,15 @@ def scan_of_a_board_before_a_wall(beams: int, between: float) -> Scan:
     return Scan(ahead / np.cos(bearings), bearings)
 
 
+@pytest.mark.parametrize("degrees", range(0, 360, 15))
+def test_normals_look_at_the_sensor_from_a_wall_on_any_side(degrees: int) -> None:
+    bearings = np.linspace(-0.5, 0.5, 120)
+    seen = patches(Scan(NEAR / np.cos(bearings), bearings + np.deg2rad(degrees)), MATCH)
+    outwards = np.array([np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))])
+    assert len(seen.normals) > 10
+    np.testing.assert_allclose(seen.normals @ outwards, -1, atol=1e-12)
+
+
 @pytest.mark.parametrize("between", [0.05, 0.15, 0.5, 0.9])
 def test_beams_that_meet_both_sides_of_an_edge_move_no_patch(between: float) -> None:
     seen = patches(scan_of_a_board_before_a_wall(180, between), MATCH)

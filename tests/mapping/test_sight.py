@@ -34,3 +34,13 @@ def test_what_no_beam_returned_from_counts_as_neither(beams: int) -> None:
     lies_on, nearer = agreement(sight(seen(HERE, beams, half)), sight(seen(HERE, beams)), np.zeros(3), 0.1)
     assert lies_on == pytest.approx(0.5, abs=0.06)
     assert nearer == 0
+
+
+@pytest.mark.parametrize("beams", [2, 24, 150, 249, 250, 251, 252, 253, 254, 255, 300, 900])
+@pytest.mark.parametrize("wide", [0.3, 0.5, 0.51, 0.7, 1.0])
+def test_nothing_is_known_between_returns_twice_as_far_apart_as_most_beams(beams: int, wide: float) -> None:
+    """As many beams lie wide apart as that, the others side by side."""
+    gaps = np.where(np.arange(beams - 1) < wide * (beams - 1), 1.0, 1e-6)
+    bearings = np.concatenate([[0.0], np.cumsum(gaps)]) * 6.283 / gaps.sum() - np.pi + 1e-5
+    expected = max(0.1, 2 * np.median(np.diff(bearings)))
+    assert sight(Scan(np.ones(beams), bearings)).apart == pytest.approx(expected, rel=1e-9)

@@ -7,6 +7,7 @@ import numpy as np
 from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
 from lidarcore.geometry import HERE, UncertainPose
+from lidarcore.mapping.matching.expectation import Expectation
 from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
 from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.prediction import Prediction
@@ -66,9 +67,10 @@ class FrontEnd:
         guess = self._known.compose(driven)
         moved = self._moved.compose(self._prediction.farther(driven, scan))
         wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
-        scan, seen, registered = self._registered(self._sweep.remove(scan, wheels, removed), guess, dt)
-        matched, tie, on = self._judged(seen, guess, registered)
-        is_blind = len(seen.near.means) < BLIND
+        expected = self._map.expects(guess)
+        scan, seen, registered = self._registered(self._sweep.remove(scan, wheels, removed), expected, dt)
+        matched, tie, on = self._judged(seen, guess, expected, registered)
+        is_blind = len(seen.near_means) < BLIND
         island = not is_blind and not on and bool(tie.covariance[2, 2] > VAGUE**2)
         self._prediction.go_on(scan, self._known, guess, matched, dt, on)
         self._known, self._moved = tie, moved
@@ -101,28 +103,28 @@ class FrontEnd:
         self._scans = 1
         return self._first
 
-    def _registered(self, scan: Scan, guess: UncertainPose, dt: float) -> tuple[Scan, Patches, Registration]:
+    def _registered(self, scan: Scan, expected: Expectation, dt: float) -> tuple[Scan, Patches, Registration]:
         """The scan on the local map, once more without the motion that it shows there."""
         seen = patches(scan, self._settings.match)
-        registered = self._map.registered(scan, seen, guess)
+        registered = self._map.registered(scan, seen, expected)
         if registered.inliers >= SURE and dt > 0:
             corrected = self._sweep.correct(scan, self._known.pose, self._map.tie(registered).pose, dt)
             if corrected is not scan:
                 scan, seen = corrected, patches(corrected, self._settings.match)
-                registered = self._map.registered_again(seen, guess, registered.pose)
+                registered = self._map.registered_from(registered.pose, seen, expected)
         return scan, seen, registered
 
     def _judged(
-        self, seen: Patches, guess: UncertainPose, registered: Registration
+        self, seen: Patches, guess: UncertainPose, expected: Expectation, registered: Registration
     ) -> tuple[UncertainPose, UncertainPose, bool]:
         """Where it was matched, or guessed; the same as uncertain as it stands; and whether it lies on the map."""
-        rival = self._map.rival(seen, guess, registered)
-        is_chance = self._map.is_chance(seen, guess, registered)
+        rival = self._map.rival(seen, expected, registered)
+        is_chance = self._map.is_chance(seen, expected, registered)
         on = registered.inliers >= self._settings.inliers and not is_chance and rival is None
         matched = guess
         if on:
             pose, P = self._map.tie(registered)
-            matched = UncertainPose(pose, P + self._map.scatter(seen, guess, registered))
+            matched = UncertainPose(pose, P + self._map.scatter(seen, expected, registered))
         if rival is not None:
             return matched, self._map.either(registered, rival), on
         return matched, UncertainPose(matched.pose, matched.covariance + self._sweep.covariance), on
@@ -140,7 +142,8 @@ class FrontEnd:
         straight = first
         for _ in range(_ROUNDS):
             still = without(scan, velocity - given)
-            registered = self._map.registered(still, patches(still, self._settings.match), driven)
+            seen = patches(still, self._settings.match)
+            registered = self._map.registered(still, seen, self._map.expects(driven))
             if registered.inliers < SURE:
                 straight = first
                 break

@@ -54,6 +54,11 @@ class Patches(NamedTuple):
         """Those whose returns lie near each other."""
         return Patches(*(column[self.counts > 0] for column in self))
 
+    @property
+    def near_means(self) -> Array:
+        """(K, 2) m of these alone."""
+        return self.means[self.counts > 0]
+
 
 def patches(scan: Scan, settings: MatchSettings) -> Patches:
     """The patches of a scan; none where fewer than three neighbouring returns make a line."""

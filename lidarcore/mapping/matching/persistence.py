@@ -3,6 +3,7 @@
 import numpy as np
 
 from lidarcore.arrays import Array
+from lidarcore.compiled import kernel
 from lidarcore.geometry import UncertainPose, compose_jacobians, relative, relative_jacobians
 
 _NOTHING = np.zeros((3, 3))
@@ -60,6 +61,7 @@ class Persistence:
         self.step = np.zeros(3)
 
 
+@kernel
 def _untold(guess: Array, found: Array) -> Array:
     """(3, 3) that takes of an error of the guess what stays of it, from the covariances of guess and match.
 
@@ -68,8 +70,7 @@ def _untold(guess: Array, found: Array) -> Array:
     L = np.linalg.cholesky(guess)
     back = np.linalg.inv(L)
     stays, V = np.linalg.eigh(back @ found @ back.T)
-    untold: Array = L @ (V * np.clip(stays, 0.0, 1.0)) @ V.T @ back
-    return untold
+    return L @ (V * np.clip(stays, 0.0, 1.0)) @ V.T @ back
 
 
 def _within(J: Array, covariance: Array) -> Array:

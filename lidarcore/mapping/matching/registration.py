@@ -30,9 +30,10 @@ class Registration(NamedTuple):
     inliers: float
 
 
+@kernel
 def information_of(covariance: Array) -> Array:
     """Inverse (3, 3) of a covariance."""
-    information: Array = np.linalg.inv(covariance).astype(np.float64)
+    information: Array = np.linalg.inv(covariance)
     return information
 
 

@@ -13,6 +13,7 @@ from lidarcore.scan import Scan
 # Between returns farther apart than both nothing was seen.
 _APART = 0.1  # rad
 _BEAMS = 2.0  # times the spacing of beams
+_MANY = 2 + 4 * np.pi * _BEAMS / _APART  # beams: no half of their spacings can be so wide that it matters
 _CONFLICT = 0.2  # m by which a point must lie before a surface to contradict it
 
 
@@ -33,8 +34,14 @@ def sight(scan: Scan) -> Sight:
     """The returns of a scan."""
     bearings = wrap(scan.bearings[scan.valid])
     order = np.argsort(bearings, kind="stable")
-    spacing = float(np.median(np.diff(np.sort(wrap(scan.bearings))))) if len(scan) > 1 else 0.0
-    return Sight(bearings[order], scan.ranges[scan.valid][order], max(_APART, _BEAMS * spacing))
+    return Sight(bearings[order], scan.ranges[scan.valid][order], _apart(scan.bearings))
+
+
+def _apart(bearings: Array) -> float:
+    """Rad between two returns of beams at bearings (N,) from which on nothing is known of what lies between."""
+    if not 1 < len(bearings) < _MANY:
+        return _APART
+    return max(_APART, _BEAMS * float(np.median(np.diff(np.sort(wrap(bearings))))))
 
 
 @kernel
