@@ -33,8 +33,7 @@ class Registration(NamedTuple):
 @kernel
 def information_of(covariance: Array) -> Array:
     """Inverse (3, 3) of a covariance."""
-    information: Array = np.linalg.inv(covariance)
-    return information
+    return np.linalg.inv(covariance).astype(np.float64)
 
 
 def register(
