@@ -99,18 +99,22 @@ def test_it_makes_way_for_what_must_be_read_first(own_server: Server, visit: Cal
 
 
 def test_nothing_is_explained_before_anything_is_seen(visit: Callable[..., Visitor]) -> None:
-    visitor, is_heard = visit(1400, 900), False
+    visitor, is_heard = visit(1400, 900, first_visit=True), False
     page = visitor.page
     page.route_web_socket("**", lambda socket: socket.connect_to_server() if is_heard else None)
     page.goto(visitor.server.url)
     expect(page.locator("#setting-extraction-min_points")).to_be_attached()
-    legend, scale = page.get_by_text("Legend", exact=True), page.get_by_role("img", name="Scale")
-    expect(legend).to_be_hidden()
-    expect(scale).to_be_hidden()
+    explained = [
+        page.get_by_text("Legend", exact=True),
+        page.get_by_role("img", name="Scale"),
+        page.get_by_role("button", name="Build a map"),
+    ]
+    for part in explained:
+        expect(part).to_be_hidden()
     is_heard = True
     visitor.open()
-    expect(legend).to_be_visible()
-    expect(scale).to_be_visible()
+    for part in explained:
+        expect(part).to_be_visible()
 
 
 def test_on_a_phone_it_leaves_view_and_tabs_free_and_its_buttons_are_easy_to_tap(
