@@ -2,7 +2,7 @@
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import act, chi_square_gate, rotation, squared_mahalanobis
@@ -25,7 +25,7 @@ def false_alarms(pose: Array, pairs: Ints, observed: Points, landmarks: Points, 
     apart = act(pose, observed.xy[i]) - landmarks.xy[j]
     on = int((squared_mahalanobis(apart, seen[i] + landmarks.covariance[j]) < _GATE).sum())
     share = float(_covered(seen, observed, landmarks).mean())
-    return tried * float(binom.sf(on - _FIXED - 1, len(observed) - _FIXED, share))
+    return tried * float(bdtrc(on - _FIXED - 1, len(observed) - _FIXED, share))
 
 
 def _covered(seen: Array, observed: Points, landmarks: Points) -> Array:

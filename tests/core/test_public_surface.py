@@ -28,6 +28,13 @@ def test_importing_loads_neither_http_nor_filters_nor_maps():
     assert not late & set(done.stdout.split())
 
 
+def test_maps_and_filters_load_neither_clustering_nor_statistics():
+    """A third of a second each, which every command and the server would wait for."""
+    code = "import sys, lidarcore.mapping.mapper, lidarcore.localization; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"sklearn", "scipy.stats"} & set(done.stdout.split())
+
+
 def test_what_was_found_and_read_shows_what_it_is(tmp_path):
     bearings = np.linspace(-np.pi, np.pi, 720, endpoint=False)
     ranges = 2 / np.maximum(np.abs(np.cos(bearings)), np.abs(np.sin(bearings)))
