@@ -21,6 +21,7 @@ _CLOSE, _CLOSE_TURN = 0.5, 0.25  # m and rad within which two poses are one
 _WIDE = 1.0  # m to either side from which on a window is searched in cells of twice the size
 _ENOUGH = 120  # points that tell one pose from another; more cost time only
 _REACH = 3  # standard deviations, of the window and of the blur
+_AT_ONCE = 16  # points whose scores are summed until it is looked whether a shift can still win
 
 
 _NO_POSES = np.empty((0, 3))
@@ -84,13 +85,14 @@ def candidates(
     unit = np.array([cell, cell, 1.0])
     centre = np.array([*(guess[:2] - low) / cell, guess[2]])
     window = _Window(centre, half, turns, sigma / unit, np.array([_CLOSE / cell, _CLOSE_TURN]))
-    cells = _cells(near / cell, window)
-    bounds = _bounds(_blocks(fine), cells, window)
+    cells, blocks = _cells(near / cell, window), _blocks(fine)
+    bounds = _bounds(blocks, cells, window)
     order, known = np.argsort(-bounds, axis=None), bounds.copy()
     while True:
         others = (besides - guess) / unit
         others[:, 2] = wrap(others[:, 2])
-        found: Array = guess + np.array(_search(fine, cells, bounds, known, order, others, window)) * unit
+        shift = _search(fine, blocks, cells, bounds, known, order, others, window)
+        found: Array = guess + np.array(shift) * unit
         yield found
         besides = np.concatenate([besides, found[None]])
 
@@ -148,7 +150,14 @@ def _blocks(fine: Singles) -> Singles:
 
 @kernel
 def _search(
-    fine: Singles, cells: Ints, bounds: Array, known: Array, order: Ints, others: Array, window: _Window
+    fine: Singles,
+    blocks: Singles,
+    cells: Ints,
+    bounds: Array,
+    known: Array,
+    order: Ints,
+    others: Array,
+    window: _Window,
 ) -> tuple[float, float, float]:
     """Best shift, in cells, and turn that is not close to one of others (E, 3): looks into blocks in the order given.
 
@@ -165,8 +174,7 @@ def _search(
         t, block = divmod(n, bounds.shape[1] * bounds.shape[2])
         a, b = divmod(block, bounds.shape[2])
         u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
-        _sum_scores(fine, cells[t], u, v, scores)
-        limits[n] = scores.max() - _least_penalty(u, v, turns[t], window.sigma)
+        limits[n] = _sum_scores(fine, blocks, cells[t], u, v, flat[n], best, scores)
         if limits[n] <= best:
             continue
         limits[n] = -np.inf
@@ -210,15 +218,26 @@ def _bounds(blocks: Singles, cells: Ints, window: _Window) -> Array:
 
 
 @kernel
-def _sum_scores(fine: Singles, cells: Ints, u: int, v: int, scores: Singles) -> None:
-    """Sums of the scores of points in cells (N, 2), for each shift in the block from (u, v) on; 0 beyond the grid."""
+def _sum_scores(
+    fine: Singles, blocks: Singles, cells: Ints, u: int, v: int, bound: float, best: float, scores: Singles
+) -> float:
+    """Sums of the scores of points in cells (N, 2), for each shift in the block from (u, v) on; 0 beyond the grid.
+
+    Returns what none of these shifts exceeds, which was `bound` before. Where that is no more than the best one already
+    after some of the points, the sums are left as they are then.
+    """
     scores[:] = 0.0
     for k in range(len(cells)):
-        i = max(min(cells[k, 0] + u, fine.shape[0] - _BLOCK), 0)
-        j = max(min(cells[k, 1] + v, fine.shape[1] - _BLOCK), 0)
+        x, y = cells[k, 0] + u, cells[k, 1] + v
+        i, j = max(min(x, fine.shape[0] - _BLOCK), 0), max(min(y, fine.shape[1] - _BLOCK), 0)
         for a in range(_BLOCK):
             for b in range(_BLOCK):
                 scores[a, b] += fine[i + a, j + b]
+        if 0 <= x < fine.shape[0] and 0 <= y < fine.shape[1]:
+            bound -= blocks[x >> _SHIFT, y >> _SHIFT]
+        if k % _AT_ONCE == _AT_ONCE - 1 and bound + scores.max() <= best:
+            break
+    return bound + scores.max()
 
 
 @kernel
