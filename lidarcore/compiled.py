@@ -117,7 +117,10 @@ def _fingerprint(function: FunctionType) -> str:
         digest.update(repr(constants).encode())
         digest.update(repr(code.co_names).encode())
         for value in _used(code, function.__globals__):
-            digest.update(_described(value))
+            if (
+                getattr(value, "py_func", None) is not function
+            ):  # it may have the name of what it calls elsewhere
+                digest.update(_described(value))
     return digest.hexdigest()
 
 

@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 
 import lidarcore  # noqa: F401
@@ -23,6 +24,11 @@ def whole(x):
     return FACTOR * part(x)
 print(whole(3.0), sum(whole.stats.cache_hits.values()))
 """
+
+
+@compiled.kernel
+def floor(x: float) -> float:
+    return np.floor(x)
 
 
 def run(folder: Path, source: str, name: str = "callee") -> tuple[float, int]:
@@ -52,6 +58,10 @@ def test_kept_code_is_made_anew_where_a_module_that_it_used_has_another_name(tmp
     (tmp_path / "callee.py").unlink()
     assert run(tmp_path, CALLEE.format("+ 1", 10), "renamed") == (40.0, 0)
     assert run(tmp_path, CALLEE.format("+ 1", 10), "renamed") == (40.0, 1)
+
+
+def test_a_kernel_may_have_the_name_of_what_it_calls_in_another_module() -> None:
+    assert floor(2.5) == 2.0
 
 
 def test_numbas_settings_are_left_alone() -> None:
