@@ -29,7 +29,7 @@ def test_importing_loads_neither_http_nor_filters_nor_maps():
 
 
 def test_maps_and_filters_load_neither_clustering_nor_statistics():
-    """A third of a second each, which every command and the server would wait for."""
+    """Every command and the server would wait for what hardly any of them needs."""
     code = "import sys, lidarcore.mapping.mapper, lidarcore.localization; print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"sklearn", "scipy.stats"} & set(done.stdout.split())

@@ -221,10 +221,10 @@ def _bounds(blocks: Singles, cells: Ints, window: _Window) -> Array:
 def _sum_scores(
     fine: Singles, blocks: Singles, cells: Ints, u: int, v: int, bound: float, best: float, scores: Singles
 ) -> float:
-    """Sums of the scores of points in cells (N, 2), for each shift in the block from (u, v) on; 0 beyond the grid.
+    """Writes sums of the scores of points in cells (N, 2), for each shift of the block from (u, v); 0 beyond the grid.
 
-    Returns what none of these shifts exceeds, which was `bound` before. Where that is no more than the best one already
-    after some of the points, the sums are left as they are then.
+    `bound` is what no shift of the block exceeds, as its surroundings tell; returned is what the scores themselves tell
+    of that. Where it is no more than the best shift has, some points are left out of the sums.
     """
     scores[:] = 0.0
     for k in range(len(cells)):

@@ -55,7 +55,7 @@ def _fit_line(points: Array, i: int, first: int, count: int, noise: Array, row: 
 def _normal(a: float, b: float, root: float) -> tuple[float, float]:
     """Unit vector (-sin t, cos t) of half the angle 2 t of (a, b), which is `root` long; (0, 1) if that is 0.
 
-    By the larger one of the two: angles and their cosines take five times as long.
+    From the larger one of the two, which loses no digits; without the angle itself, which takes longer.
     """
     if root == 0:
         return 0.0, 1.0
