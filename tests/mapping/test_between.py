@@ -13,7 +13,8 @@ from lidarcore.evaluation.maps.honesty import drive
 from lidarcore.geometry import compose, pose_difference, relative, rotation, squared_mahalanobis
 from lidarcore.mapping import Mapper, MapperSettings
 from lidarcore.mapping.between import _reduced, _replaced, kept
-from lidarcore.mapping.graph.recovery import Recovery, factor
+from lidarcore.mapping.graph.factor import Factor
+from lidarcore.mapping.graph.recovery import Recovery
 from lidarcore.mapping.graph.refinement import UNMEASURED, Refined
 from lidarcore.mapping.matching.motion_smoothing import _covered
 
@@ -102,7 +103,7 @@ def test_what_the_map_replaces_is_told_by_keyframes_that_surfaces_tie(joined):
     """It moved the second and third by their own deviation each, and left the step to the fourth as it was."""
     local = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]])
     poses = local + np.array([[0.0], [0.1], [0.2], [0.2]]) * [1, 1, 0]
-    recovery = Recovery(factor(csc_array(np.eye(12))))
+    recovery = Recovery(Factor(csc_array(np.eye(12))))
     refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), UNMEASURED, recovery)
     share = _replaced(refined, local, np.full((4, 3), 0.1**2 / 2))
     assert share == pytest.approx(2 / 3 if any(joined) else 1)
@@ -115,7 +116,7 @@ def test_what_the_map_keeps_of_errors_is_told_by_keyframes_that_surfaces_tie(joi
     scatter = np.array(
         [[0.5, 2, 4]] * 4
     )  # ahead less than the map's own: it has all of the error, and no more
-    recovery = Recovery(factor(csc_array(np.eye(12))))
+    recovery = Recovery(Factor(csc_array(np.eye(12))))
     refined = Refined(poses, np.zeros((4, 3, 3)), np.zeros((4, 2, 3)), np.array(joined), UNMEASURED, recovery)
     assert kept(refined, scatter) == pytest.approx([1, 0.75, 0.25] if any(joined) else [1, 1, 1])
 

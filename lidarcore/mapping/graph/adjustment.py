@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import rotate, rotation
 from lidarcore.mapping.cells import cells
-from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells
+from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells, take_lines
 from lidarcore.mapping.graph.equations import NormalEquations
 from lidarcore.mapping.graph.known import Known, parted
 
@@ -54,7 +54,7 @@ def speeds_left(surfaces: Surfaces, poses: Array, noise: Noise) -> Array:
     """
     sums, _, _ = _summed(surfaces, poses, noise, 6)
     H = sums.D + np.diag(_VAGUE)
-    np.add.at(H, sums.at[:, 0], -sums.U @ sums.U.mT)
+    take_lines(H, sums.U, sums.at[:, 0])
     turn = np.zeros((len(poses), 6, 6))
     turn[:, [2, 5], [2, 5]] = 1.0
     turn[:, :2, :2] = turn[:, 3:5, 3:5] = rotation(poses[:, 2])

@@ -136,6 +136,17 @@ def sum_cells(
 
 
 @kernel
+def take_lines(D: Array, U: Array, keyframes: Ints) -> None:
+    """Take from D (K, n, n) of each keyframe what its groups U (G, n, 2) do not say as lines are unknown: U U^T."""
+    n = D.shape[1]
+    for i in range(len(U)):
+        own, u = D[keyframes[i]], U[i]
+        for p in range(n):
+            for q in range(n):
+                own[p, q] -= u[p, 0] * u[q, 0] + u[p, 1] * u[q, 1]
+
+
+@kernel
 def _inverse_root(N: Array) -> tuple[float, float, float, float]:
     """Determinant of N (2, 2), and the lower triangle of L, where N^-1 = L L^T."""
     det = N[0, 0] * N[1, 1] - N[0, 1] * N[0, 1]

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csc_array, csr_array, diags_array
-from scipy.sparse.linalg import LinearOperator, SuperLU, cg
+from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
+from scipy.sparse.linalg import LinearOperator, cg
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import pose_difference, relative, relative_jacobians
+from lidarcore.mapping.graph.factor import Factor
 from lidarcore.mapping.graph.pose_graph import FIXED
-from lidarcore.mapping.graph.recovery import factor
 
 _EXACT = 1e-6  # of the gradient may be left: some ten-thousandths of the step
 _ROUNDS = 40  # of conjugate gradients: a factor takes as long as 60 to 130
@@ -44,6 +44,18 @@ class NormalEquations(NamedTuple):
         """H (3 K, 3 K), which ties all keyframes that saw a surface to each other: nearly dense in a room."""
         return csc_array(self.own - self.lines @ self.lines.T)
 
+    def factored(self) -> Factor:
+        """Factor of H.
+
+        Of poses and lines, those of which there are more are eliminated first. Who drives through the same rooms for an
+        hour has ten poses for each line: H alone would fill gigabytes, and lines do not grow in number.
+        """
+        poses, lines = self.lines.shape
+        if lines > poses:
+            return Factor(self.information())
+        both = block_array([[self.own, self.lines], [self.lines.T, eye_array(lines)]], format="csc")
+        return Factor(both, poses)
+
     def with_steps(self, poses: Array, steps: list[Step]) -> "NormalEquations":
         """The same at poses (K, 3) with the steps, and the first pose fixed."""
         ends = np.array([(step.i, step.j) for step in steps], np.int64).reshape(-1, 2)
@@ -62,17 +74,17 @@ class NormalEquations(NamedTuple):
         tied = csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=self.own.shape)
         return NormalEquations(csr_array(self.own + tied + diags_array(fixed)), self.lines, g)
 
-    def solution(self, near: SuperLU | None) -> tuple[Array, SuperLU]:
+    def solution(self, near: Factor | None) -> tuple[Array, Factor]:
         """x (3 K,), and a factor for the next equations: the given one, of equations `near` these, or their own.
 
         Conjugate gradients, preconditioned with a factor of equations that are near, take a tenth of the time of a new
         factor [Golub & Van Loan, Matrix Computations, 11.5]. Where it is not near enough, these are factored.
         """
-        if near is not None and near.shape == self.own.shape:
+        if near is not None and len(near) == self.own.shape[0]:
             H = LinearOperator(self.own.shape, lambda x: self.own @ x - self.lines @ (self.lines.T @ x))
             M = LinearOperator(self.own.shape, near.solve)
             x, failed = cg(H, -self.gradient, M=M, rtol=_EXACT, maxiter=_ROUNDS)
             if not failed:
                 return x, near
-        near = factor(self.information())
+        near = self.factored()
         return near.solve(-self.gradient), near

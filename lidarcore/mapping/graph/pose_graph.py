@@ -16,7 +16,8 @@ from lidarcore.geometry import UncertainPose, as_pose_covariance, relative_jacob
 from lidarcore.localization.ekf.estimate import as_pose
 from lidarcore.mapping.doubt import DOUBTFUL, loss
 from lidarcore.mapping.graph.edges import edge_errors, linearise
-from lidarcore.mapping.graph.recovery import Recovery, factor
+from lidarcore.mapping.graph.factor import Factor
+from lidarcore.mapping.graph.recovery import Recovery
 
 _COOLING = 4.0  # by which doubts about new edges set in earlier from round to round
 FIXED = 1e12  # information of the first pose
@@ -106,7 +107,7 @@ class PoseGraph:
         poses, heat, chi2 = self._poses.copy(), self._heat(), 0.0
         for _ in range(rounds):
             H, b, chi2 = self._linearised(poses, heat)
-            solver = factor(H)
+            solver = Factor(H)
             whole = solver.solve(-b).reshape(-1, 3)
             whole[0] = 0.0
             step = self._shortened(whole, poses, heat)
@@ -151,7 +152,7 @@ class PoseGraph:
     def _recovered(self) -> Recovery:
         if self._recovery is None or len(self._recovery) < len(self):
             self._check_connected()
-            self._recovery = Recovery(factor(self._linearised(self._poses, 1.0)[0]))
+            self._recovery = Recovery(Factor(self._linearised(self._poses, 1.0)[0]))
         return self._recovery
 
     def _extended(self, i: int, j: int, P: Array, doubted: bool) -> Recovery | None:

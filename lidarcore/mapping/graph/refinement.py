@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.sparse.linalg import SuperLU
 from scipy.special import chdtr
 
 from lidarcore.arrays import Array, Bools, Ints
@@ -25,8 +24,9 @@ from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.mapping.graph.adjustment import Surfaces, normal_equations, speeds_left
 from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
 from lidarcore.mapping.graph.equations import Step
+from lidarcore.mapping.graph.factor import Factor
 from lidarcore.mapping.graph.known import Known
-from lidarcore.mapping.graph.recovery import Recovery, factor
+from lidarcore.mapping.graph.recovery import Recovery
 from lidarcore.mapping.matching.patches import Patches
 
 _SETTLED = 0.01  # mean square of a step, in variances of the poses, below which it changes nothing
@@ -76,7 +76,7 @@ class Refined:
         return P
 
     @property
-    def factor(self) -> SuperLU:
+    def factor(self) -> Factor:
         """Of the information of the poses."""
         return self._recovery.factor
 
@@ -135,9 +135,9 @@ def refine(
         if number >= _MEASURED and size >= size_before:
             break
         size_before = size
+    speeds, near = speeds_left(surfaces, poses, noise), None  # two factors at once would take most of the memory
     equations, _ = normal_equations(surfaces, poses, noise)
-    recovery = Recovery(factor(equations.with_steps(poses, steps).information()))
-    speeds = speeds_left(surfaces, poses, noise)
+    recovery = Recovery(equations.with_steps(poses, steps).factored())
     return Refined(poses, sweeps, speeds, _joined(known, len(poses)), noise, recovery)
 
 
