@@ -135,7 +135,8 @@ def refine(
         if number >= _MEASURED and size >= size_before:
             break
         size_before = size
-    speeds, near = speeds_left(surfaces, poses, noise), None  # two factors at once would take most of the memory
+    del near  # two factors at once would take most of the memory
+    speeds = speeds_left(surfaces, poses, noise)
     equations, _ = normal_equations(surfaces, poses, noise)
     recovery = Recovery(equations.with_steps(poses, steps).factored())
     return Refined(poses, sweeps, speeds, _joined(known, len(poses)), noise, recovery)
