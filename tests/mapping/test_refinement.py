@@ -10,9 +10,11 @@ from scipy.stats import chi2
 from lidarcore.geometry import act, compose, pose_difference, relative
 from lidarcore.mapping import MatchSettings
 from lidarcore.mapping.graph.adjustment import _VAGUE, Surfaces, normal_equations, speeds_left
-from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
+from lidarcore.mapping.graph.adjustment_cells import Groups
+from lidarcore.mapping.graph.cell_lines import Noise, Observations
 from lidarcore.mapping.graph.equations import Step
-from lidarcore.mapping.graph.refinement import _measured, refine
+from lidarcore.mapping.graph.refinement import refine
+from lidarcore.mapping.graph.surface_noise import measured
 from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.sweep import without
@@ -229,7 +231,7 @@ def test_noise_is_measured_by_the_surfaces_that_tell_the_poses():
     true = np.where(claimed < 1e-4, claimed, 0.05 * claimed)
     left = rng.uniform(0.5, 1.0, len(claimed))
     squares, *_ = groups_left(claimed, true, weighed(claimed, 60, rng), rng)
-    scale, unevenness = _measured(Groups(left * squares, claimed, left, np.ones(len(claimed))), 60)
+    scale, unevenness = measured(Groups(left * squares, claimed, left, np.ones(len(claimed))), 60)
     print(scale)
     assert 0.84 < scale < 1.16
     assert unevenness < 1e-6
@@ -245,7 +247,7 @@ def test_what_poses_take_up_is_noise_too():
     rng = np.random.default_rng(11)
     claimed = np.concatenate([np.full(400, 1e-6), np.full(2000, 1e-3)])
     Q = weighed(claimed, 60, rng)
-    found = np.array([_measured(groups_left(claimed, claimed, Q, rng), 60) for _ in range(100)])
+    found = np.array([measured(groups_left(claimed, claimed, Q, rng), 60) for _ in range(100)])
     times = found[:, 0] + found[:, 1] / claimed[0]
     print(np.mean(times), np.std(times))
     assert 0.98 < np.mean(times) < 1.02

@@ -13,7 +13,8 @@ from scipy.sparse import csr_array
 from lidarcore.arrays import Array, Ints
 from lidarcore.geometry import rotate, rotation
 from lidarcore.mapping.cells import cells
-from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations, Sums, sum_cells, take_lines
+from lidarcore.mapping.graph.adjustment_cells import Groups, Sums, sum_cells, take_lines
+from lidarcore.mapping.graph.cell_lines import Noise, Observations
 from lidarcore.mapping.graph.equations import NormalEquations
 from lidarcore.mapping.graph.known import Known, parted
 

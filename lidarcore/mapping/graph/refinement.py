@@ -8,8 +8,6 @@ that all patches of one view of one place share.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
-from scipy.special import chdtr
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import (
@@ -22,19 +20,16 @@ from lidarcore.geometry import (
 )
 from lidarcore.geometry.kernels import relative_with_covariance
 from lidarcore.mapping.graph.adjustment import Surfaces, normal_equations, speeds_left
-from lidarcore.mapping.graph.adjustment_cells import Groups, Noise, Observations
+from lidarcore.mapping.graph.cell_lines import Noise, Observations
 from lidarcore.mapping.graph.equations import Step
 from lidarcore.mapping.graph.factor import Factor
 from lidarcore.mapping.graph.known import Known
 from lidarcore.mapping.graph.recovery import Recovery
+from lidarcore.mapping.graph.surface_noise import UNMEASURED, is_alike, measured
 from lidarcore.mapping.matching.patches import Patches
 
 _SETTLED = 0.01  # mean square of a step, in variances of the poses, below which it changes nothing
-_ALIKE = 0.03  # share by which a variance changes, below which it is the same
 _MEASURED = 4  # rounds after which noise is known so well that steps can be compared
-UNMEASURED = Noise(1.0, 0.005**2)
-_LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
-_INNER = float(chdtr(3, _LARGEST) / chdtr(1, _LARGEST))  # times as expected the mean square of the others is
 
 
 @dataclass(slots=True, eq=False)
@@ -127,9 +122,9 @@ def refine(
         step, near = equations.solution(near)
         poses = poses + step.reshape(-1, 3)
         poses[:, 2] = wrap(poses[:, 2])
-        taken, noise = noise, _measured(groups, len(poses))
+        taken, noise = noise, measured(groups, len(poses))
         size = float(-equations.gradient @ step) / len(step)
-        if size < _SETTLED and _is_alike(taken, noise, groups):
+        if size < _SETTLED and is_alike(taken, noise, groups):
             break
         # Cells are cut anew in each round, which alone moves poses of a large building by some tenths of a deviation.
         if number >= _MEASURED and size >= size_before:
@@ -140,13 +135,6 @@ def refine(
     equations, _ = normal_equations(surfaces, poses, noise)
     recovery = Recovery(equations.with_steps(poses, steps).factored())
     return Refined(poses, sweeps, speeds, _joined(known, len(poses)), noise, recovery)
-
-
-def _is_alike(before: Noise, now: Noise, groups: Groups) -> bool:
-    """Whether a group of usual variance has hardly any other noise."""
-    usual = float(np.median(groups.variances)) if len(groups.variances) else 1.0
-    earlier, later = (one.scale * usual + one.unevenness for one in (before, now))
-    return abs(float(np.log(later / earlier))) < _ALIKE
 
 
 def _joined(known: Known | None, keyframes: int) -> Bools:
@@ -167,33 +155,6 @@ def _observations(scans: list[Patches], since: list[Array] | None, assumed: floa
     times = np.zeros(len(numbers)) if since is None else np.concatenate(since)
     means, normals, variances, near = (np.concatenate(column) for column in columns)
     return Observations(numbers, means, normals, variances, near, times)
-
-
-def _measured(groups: Groups, keyframes: int) -> Noise:
-    """Factor of the noise's variance, and the variance of what a group shares, from their residuals."""
-    kept = (groups.left > 0.2) & (groups.near > 0)  # of the others' noise hardly anything is the ranges'
-    squares, noise = groups.squares[kept] / groups.left[kept], groups.variances[kept]
-    scale, shared, told = 1.0, 0.005**2, 0.0
-    for _ in range(20):
-        told = _told(groups, scale * groups.variances + shared, told, keyframes)
-        expected = scale * noise + shared
-        taken = told / (expected + told)
-        inner = squares < _LARGEST * expected * (1 - taken)
-        # Each square as it is certain, and as much as it says about the poses: those count whose claims matter.
-        weights = expected[inner] ** -1.5
-        rows = np.stack([noise, np.ones(len(noise))], -1)[inner] * weights[:, None]
-        (scale, shared), _ = nnls(rows, (squares / _INNER + taken * expected)[inner] * weights)
-        scale = max(scale, 0.01)
-    return Noise(float(scale), float(shared))
-
-
-def _told(groups: Groups, expected: Array, told: float, keyframes: int) -> float:
-    """Variance to which all others tell where a group lies, better than the one `told` before.
-
-    Of what lines leave, the 3 K unknowns of the poses take 3 K shares: each group moves them as far as it weighs beside
-    all the others.
-    """
-    return float(3 * keyframes / max((groups.left / (expected + told)).sum(), 1e-12))
 
 
 def turned(covariances: Array, headings: Array) -> Array:

@@ -10,19 +10,16 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Ints, Singles
-from lidarcore.compiled import finite_kernel, kernel
+from lidarcore.compiled import kernel
 from lidarcore.geometry import wrap
 from lidarcore.geometry.kernels import rotate
+from lidarcore.mapping.matching.scores import BLOCK, SHIFT, largest_around, score_grid, sum_scores
 from lidarcore.mapping.settings import MatchSettings
 
-_SHIFT = 3
-_BLOCK = 1 << _SHIFT  # cells, side of a block of shifts
 _CLOSE, _CLOSE_TURN = 0.5, 0.25  # m and rad within which two poses are one
 _WIDE = 1.0  # m to either side from which on a window is searched in cells of twice the size
 _ENOUGH = 120  # points that tell one pose from another; more cost time only
-_REACH = 3  # standard deviations, of the window and of the blur
-_AT_ONCE = 16  # points whose scores are summed until it is looked whether a shift can still win
-
+_REACH = 3  # standard deviations of the guess, to which it is searched
 
 _NO_POSES = np.empty((0, 3))
 
@@ -78,14 +75,14 @@ def candidates(
     if not len(kept):
         yield guess
         return
-    low, fine = _grid(kept, cell, max(settings.blur, cell))
+    low, fine = score_grid(kept, cell, max(settings.blur, cell))
     step = cell / max(1.0, arm(near))  # rad that move far points by one cell
     turns = step * np.arange(-np.floor(most[2] / step), np.floor(most[2] / step) + 1)
-    half = np.ceil(most[:2] / cell / _BLOCK).astype(np.int64)
+    half = np.ceil(most[:2] / cell / BLOCK).astype(np.int64)
     unit = np.array([cell, cell, 1.0])
     centre = np.array([*(guess[:2] - low) / cell, guess[2]])
     window = _Window(centre, half, turns, sigma / unit, np.array([_CLOSE / cell, _CLOSE_TURN]))
-    cells, blocks = _cells(near / cell, window), _blocks(fine)
+    cells, blocks = _cells(near / cell, window), largest_around(fine)
     bounds = _bounds(blocks, cells, window)
     order, known = np.argsort(-bounds, axis=None), bounds.copy()
     while True:
@@ -103,51 +100,6 @@ def arm(points: Array) -> float:
     return float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 80))
 
 
-def _grid(points: Array, cell: float, blur: float) -> tuple[Array, Singles]:
-    """Corner (2,) m of a grid around the points, and its scores: 1 at a point, falling off like a Gaussian.
-
-    The outermost blocks are 0: what lies beyond the grid scores as they do.
-    """
-    margin = _REACH * blur + (_BLOCK + 1) * cell
-    low = points.min(axis=0) - margin
-    blocks = np.ceil((points.max(axis=0) + margin - low) / cell / _BLOCK).astype(np.int64)
-    grid = np.zeros(blocks * _BLOCK, np.float32)
-    _splat((points - low) / cell, blur / cell, grid)
-    return low, grid
-
-
-@finite_kernel
-def _splat(points: Array, blur: float, grid: Singles) -> None:
-    """Largest of the Gaussians around the points, all in cells."""
-    reach = int(np.ceil(_REACH * blur))
-    along, across = np.empty(2 * reach + 1), np.empty(2 * reach + 1)
-    for k in range(len(points)):
-        # The margin leaves nothing below 0: who compiles this is told, so that the loops vectorise.
-        i, j = max(int(points[k, 0]) - reach, 0), max(int(points[k, 1]) - reach, 0)
-        for n in range(2 * reach + 1):
-            along[n] = np.exp(-((i + n + 0.5 - points[k, 0]) ** 2) / (2 * blur * blur))
-            across[n] = np.exp(-((j + n + 0.5 - points[k, 1]) ** 2) / (2 * blur * blur))
-        for m in range(2 * reach + 1):
-            for n in range(2 * reach + 1):
-                grid[i + m, j + n] = max(grid[i + m, j + n], along[m] * across[n])
-
-
-@finite_kernel
-def _blocks(fine: Singles) -> Singles:
-    """Largest score in each block and its next neighbours: what a point of the block can meet within a block's side."""
-    blocks = np.zeros((fine.shape[0] // _BLOCK, fine.shape[1] // _BLOCK), np.float32)
-    for i in range(fine.shape[0]):
-        for j in range(fine.shape[1]):
-            a, b = i // _BLOCK, j // _BLOCK
-            blocks[a, b] = max(blocks[a, b], fine[i, j])
-    for a in range(blocks.shape[0]):
-        for b in range(blocks.shape[1]):
-            for c in range(a, min(a + 2, blocks.shape[0])):
-                for d in range(b, min(b + 2, blocks.shape[1])):
-                    blocks[a, b] = max(blocks[a, b], blocks[c, d])
-    return blocks
-
-
 @kernel
 def _search(
     fine: Singles,
@@ -163,7 +115,7 @@ def _search(
 
     Blocks that were looked into are known better than by their bounds afterwards.
     """
-    turns, half, scores = window.turns, window.half, np.empty((_BLOCK, _BLOCK), np.float32)
+    turns, half, scores = window.turns, window.half, np.empty((BLOCK, BLOCK), np.float32)
     flat, limits = bounds.ravel(), known.ravel()
     best, best_u, best_v, best_turn = -np.inf, 0, 0, 0.0
     for n in order:
@@ -173,13 +125,13 @@ def _search(
             continue
         t, block = divmod(n, bounds.shape[1] * bounds.shape[2])
         a, b = divmod(block, bounds.shape[2])
-        u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
-        limits[n] = _sum_scores(fine, blocks, cells[t], u, v, flat[n], best, scores)
+        u, v = (a - half[0]) * BLOCK, (b - half[1]) * BLOCK
+        limits[n] = sum_scores(fine, blocks, cells[t], u, v, flat[n], best, scores)
         if limits[n] <= best:
             continue
         limits[n] = -np.inf
-        for du in range(u, u + _BLOCK):
-            for dv in range(v, v + _BLOCK):
+        for du in range(u, u + BLOCK):
+            for dv in range(v, v + BLOCK):
                 total = scores[du - u, dv - v] - _penalty(du, dv, turns[t], window.sigma)
                 limits[n] = max(limits[n], total)
                 if total > best and not _is_close(others, window.close, du, dv, turns[t]):
@@ -206,38 +158,15 @@ def _bounds(blocks: Singles, cells: Ints, window: _Window) -> Array:
     bounds = np.zeros((len(turns), 2 * half[0] + 1, 2 * half[1] + 1))
     for t in range(len(turns)):
         for k in range(cells.shape[1]):
-            i, j = (cells[t, k, 0] >> _SHIFT) - half[0], (cells[t, k, 1] >> _SHIFT) - half[1]
+            i, j = (cells[t, k, 0] >> SHIFT) - half[0], (cells[t, k, 1] >> SHIFT) - half[1]
             for a in range(max(0, -i), min(bounds.shape[1], blocks.shape[0] - i)):
                 for b in range(max(0, -j), min(bounds.shape[2], blocks.shape[1] - j)):
                     bounds[t, a, b] += blocks[i + a, j + b]
         for a in range(bounds.shape[1]):
             for b in range(bounds.shape[2]):
-                u, v = (a - half[0]) * _BLOCK, (b - half[1]) * _BLOCK
+                u, v = (a - half[0]) * BLOCK, (b - half[1]) * BLOCK
                 bounds[t, a, b] -= _least_penalty(u, v, turns[t], window.sigma)
     return bounds
-
-
-@kernel
-def _sum_scores(
-    fine: Singles, blocks: Singles, cells: Ints, u: int, v: int, bound: float, best: float, scores: Singles
-) -> float:
-    """Writes sums of the scores of points in cells (N, 2), for each shift of the block from (u, v); 0 beyond the grid.
-
-    `bound` is what no shift of the block exceeds, as its surroundings tell; returned is what the scores themselves tell
-    of that. Where it is no more than the best shift has, some points are left out of the sums.
-    """
-    scores[:] = 0.0
-    for k in range(len(cells)):
-        x, y = cells[k, 0] + u, cells[k, 1] + v
-        i, j = max(min(x, fine.shape[0] - _BLOCK), 0), max(min(y, fine.shape[1] - _BLOCK), 0)
-        for a in range(_BLOCK):
-            for b in range(_BLOCK):
-                scores[a, b] += fine[i + a, j + b]
-        if 0 <= x < fine.shape[0] and 0 <= y < fine.shape[1]:
-            bound -= blocks[x >> _SHIFT, y >> _SHIFT]
-        if k % _AT_ONCE == _AT_ONCE - 1 and bound + scores.max() <= best:
-            break
-    return bound + scores.max()
 
 
 @kernel
@@ -253,7 +182,7 @@ def _is_close(others: Array, close: Array, du: float, dv: float, turn: float) ->
 @kernel
 def _least_penalty(u: int, v: int, turn: float, sigma: Array) -> float:
     """Of the shifts in the block from (u, v) on: that of the one nearest to the guess."""
-    return _penalty(min(max(u, 0), u + _BLOCK - 1), min(max(v, 0), v + _BLOCK - 1), turn, sigma)
+    return _penalty(min(max(u, 0), u + BLOCK - 1), min(max(v, 0), v + BLOCK - 1), turn, sigma)
 
 
 @kernel
