@@ -6,6 +6,8 @@ from scipy.sparse import csc_array, diags_array, random_array
 
 from lidarcore.mapping.graph.factor import Factor
 
+PAIRS = np.append(np.arange(30), 30 + np.arange(30) // 2)
+
 
 def made(seed, unknowns=60) -> csc_array:
     """A random information matrix that is mostly empty."""
@@ -28,11 +30,12 @@ def test_blocks_of_the_inverse_are_those_of_the_dense_one_or_not_given_whatever_
     np.testing.assert_allclose(own[given], expected[given], rtol=1e-6, atol=1e-9)
 
 
+@pytest.mark.parametrize("groups", [None, PAIRS])
 @pytest.mark.parametrize("asked", [60, 24])
 @pytest.mark.parametrize("seed", range(5))
-def test_solutions_and_columns_are_those_of_the_dense_inverse_of_what_is_asked_for(seed, asked):
+def test_solutions_and_columns_are_those_of_the_dense_inverse_of_what_is_asked_for(seed, asked, groups):
     H = made(seed)
-    found, rng = Factor(H, asked), np.random.default_rng(seed)
+    found, rng = Factor(H, asked, groups), np.random.default_rng(seed)
     assert len(found) == asked
     inverse = np.linalg.inv(H.toarray())[:asked, :asked]
     for count in (3, 12):
@@ -40,7 +43,10 @@ def test_solutions_and_columns_are_those_of_the_dense_inverse_of_what_is_asked_f
         np.testing.assert_allclose(columns, inverse, rtol=1e-6, atol=1e-9)
     for shape in ((asked,), (asked, 1), (asked, 4)):
         b = rng.normal(size=shape)
-        for solved in (found.solve(b), Factor(H, asked).solve(b)):  # after entries were asked for, and before
+        for solved in (
+            found.solve(b),
+            Factor(H, asked, groups).solve(b),
+        ):  # after entries were asked for, and before
             np.testing.assert_allclose(solved, inverse @ b, rtol=1e-6, atol=1e-9)
 
 
@@ -48,6 +54,16 @@ def test_each_column_begins_with_its_diagonal():
     found = Factor(made(0, 300)).lower
     np.testing.assert_array_equal(found.rows[found.begins[:-1]], np.arange(300))
     np.testing.assert_array_equal(found.values[found.begins[:-1]], 1.0)
+
+
+def test_groups_are_eliminated_as_one_in_an_order_that_fills_little():
+    """An arrow, whose tip would fill everything if it went first."""
+    H = np.diag(np.full(60, 61.0))
+    H[:2, :] += 1.0
+    H[:, :2] += 1.0
+    lower = Factor(csc_array(H), groups=np.append([0, 0], 1 + np.arange(58))).lower
+    assert set(lower.order[:2]) == {58, 59}
+    assert len(lower.rows) <= 60 + 2 * 58 + 1
 
 
 def test_a_factor_keeps_nothing_else_alive():

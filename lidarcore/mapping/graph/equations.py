@@ -47,14 +47,14 @@ class NormalEquations(NamedTuple):
     def factored(self) -> Factor:
         """Factor of H.
 
-        Of poses and lines, those of which there are more are eliminated first. Who drives through the same rooms for an
+        Of poses and lines, those of which there are more are eliminated first. Who goes through the same rooms for an
         hour has ten poses for each line: H alone would fill gigabytes, and lines do not grow in number.
         """
         poses, lines = self.lines.shape
         if lines > poses:
             return Factor(self.information())
         both = block_array([[self.own, self.lines], [self.lines.T, eye_array(lines)]], format="csc")
-        return Factor(both, poses)
+        return Factor(both, poses, np.append(np.arange(poses), poses + np.arange(lines) // 2))
 
     def with_steps(self, poses: Array, steps: list[Step]) -> "NormalEquations":
         """The same at poses (K, 3) with the steps, and the first pose fixed."""
