@@ -15,8 +15,8 @@ from lidarcore.mapping.loops.consistency import Loop
 from lidarcore.mapping.loops.keyframes import Keyframes
 from lidarcore.mapping.matching.distortion import own_variances, pose_shift
 from lidarcore.mapping.matching.front import FrontEnd
-from lidarcore.mapping.matching.motion_smoothing import UNTOLD, ScanMotion, smoothed, with_distortion
-from lidarcore.mapping.matching.sweep import half_time
+from lidarcore.mapping.motion.smoothing import UNTOLD, ScanMotion, smoothed, with_distortion
+from lidarcore.mapping.motion.sweep import half_time
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lidarcore.mapping.matching.jerk import STEADY, Drive
+from lidarcore.mapping.motion.jerk import STEADY, Drive
 
 USUAL = (0.1, 0.5, 0.3)  # m, m/s, m/s²
 

@@ -17,7 +17,7 @@ from lidarcore.mapping.graph.factor import Factor
 from lidarcore.mapping.graph.recovery import Recovery
 from lidarcore.mapping.graph.refinement import Refined
 from lidarcore.mapping.graph.surface_noise import UNMEASURED
-from lidarcore.mapping.matching.motion_smoothing import _covered
+from lidarcore.mapping.motion.smoothing import _covered
 
 SETTINGS = MapperSettings().with_noise(SensorNoise(0.01, 0.001))
 

@@ -13,7 +13,7 @@ from lidarcore.mapping.matching.distortion import own_variances, pose_shift
 from lidarcore.mapping.matching.patches import joined, patches
 from lidarcore.mapping.matching.registration import register
 from lidarcore.mapping.matching.surfels import surfels
-from lidarcore.mapping.matching.sweep import half_time, without
+from lidarcore.mapping.motion.sweep import half_time, without
 from lidarcore.simulation import SimulatedSensor
 from lidarcore.simulation.rooms import box, rectangular_room
 from lidarcore.simulation.world import World

@@ -6,9 +6,9 @@ from jerky_motions import motions, only
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
-from lidarcore.mapping.matching.jerk import JERKS, STEADY, Drive, _most_likely, estimated, kinds, window
-from lidarcore.mapping.matching.jerk_fits import evidences
-from lidarcore.mapping.matching.motion_smoothing import UNTOLD
+from lidarcore.mapping.motion.jerk import JERKS, STEADY, Drive, _most_likely, estimated, kinds, window
+from lidarcore.mapping.motion.jerk_fits import evidences
+from lidarcore.mapping.motion.smoothing import UNTOLD
 
 T = np.arange(-3, 4) / 10
 SIGMA = np.array([1e-3, 2e-3, 5e-4])

@@ -9,7 +9,7 @@ from lidarcore import SensorNoise
 from lidarcore.evaluation.maps.honesty import drive
 from lidarcore.geometry import compose, inverse, pose_difference, relative, rotate
 from lidarcore.mapping import Mapper, MapperSettings
-from lidarcore.mapping.matching.motion_smoothing import UNTOLD, ScanMotion, smoothed, with_distortion
+from lidarcore.mapping.motion.smoothing import UNTOLD, ScanMotion, smoothed, with_distortion
 
 HALF = 0.05  # s
 T = np.arange(40) / 10

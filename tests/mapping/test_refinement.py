@@ -17,7 +17,7 @@ from lidarcore.mapping.graph.refinement import refine
 from lidarcore.mapping.graph.surface_noise import measured
 from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
-from lidarcore.mapping.matching.sweep import without
+from lidarcore.mapping.motion.sweep import without
 from lidarcore.simulation import World, furnished_room
 from lidarcore.simulation.paths import wandering
 from lidarcore.simulation.rooms import rectangular_room

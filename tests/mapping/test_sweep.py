@@ -5,7 +5,7 @@ import pytest
 
 from lidarcore import Scan
 from lidarcore.geometry import compose, inverse
-from lidarcore.mapping.matching.sweep import Sweep, along_arc, arc_end
+from lidarcore.mapping.motion.sweep import Sweep, along_arc, arc_end
 
 PERIOD, HALF = 0.1, 0.05  # s
 TIMES = np.linspace(0, 2 * HALF, 101)

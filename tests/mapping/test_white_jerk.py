@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from jerky_motions import motions, only
 
-from lidarcore.mapping.matching.jerk import JERKS, estimated, window
-from lidarcore.mapping.matching.white_jerk import STRETCHES, wander
+from lidarcore.mapping.motion.jerk import JERKS, estimated, window
+from lidarcore.mapping.motion.white_jerk import STRETCHES, wander
 
 H = 0.05  # s, half a sweep
 T = np.array([-0.11, 0.0, 0.1, 0.2])

@@ -48,7 +48,7 @@ class NormalEquations(NamedTuple):
         """Factor of H.
 
         Of poses and lines, those of which there are more are eliminated first. Who goes through the same rooms for an
-        hour has ten poses for each line: H alone would fill gigabytes, and lines do not grow in number.
+        hour has many poses for each line: H alone would fill gigabytes, and lines do not grow in number.
         """
         poses, lines = self.lines.shape
         if lines > poses:

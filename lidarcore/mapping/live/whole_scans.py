@@ -22,7 +22,7 @@ from lidarcore.mapping.live.background import Background, Corrected, MapPicture
 from lidarcore.mapping.live.locate_worker import LocateWorker
 from lidarcore.mapping.live.map_worker import MapWorker
 from lidarcore.mapping.matching.front import FrontEnd
-from lidarcore.mapping.matching.sweep import PAUSE, elapsed
+from lidarcore.mapping.motion.sweep import PAUSE, elapsed
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.mapping.walls import Walls

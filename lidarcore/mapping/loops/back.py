@@ -18,7 +18,7 @@ from lidarcore.mapping.loops.thinning import spare
 from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.matching.sight import sight
-from lidarcore.mapping.matching.sweep import without
+from lidarcore.mapping.motion.sweep import without
 from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 

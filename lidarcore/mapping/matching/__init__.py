@@ -1,1 +1,1 @@
-"""Where a scan lies on the map around it: surfaces of scans, searched and registered, with the motion taken out."""
+"""Where a scan lies on the map around it: surfaces of scans, searched and registered."""

@@ -4,7 +4,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.mapping.matching.patches import Patches
-from lidarcore.mapping.matching.sweep import half_time, is_swept
+from lidarcore.mapping.motion.sweep import half_time, is_swept
 from lidarcore.scan import Scan
 
 _PRIOR = np.diag([1.0, 1.0, 1.0])  # 1/m², 1/rad²: patches that do not tell a pose shift nothing

@@ -13,7 +13,7 @@ from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.prediction import Prediction
 from lidarcore.mapping.matching.registration import Registration
 from lidarcore.mapping.matching.standing import Standing
-from lidarcore.mapping.matching.sweep import NOTHING, PAUSE, Sweep, is_swept, without
+from lidarcore.mapping.motion.sweep import NOTHING, PAUSE, Sweep, is_swept, without
 from lidarcore.mapping.settings import VAGUE, FrontSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.noise import SensorNoise

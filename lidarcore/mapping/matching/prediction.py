@@ -7,7 +7,7 @@ from lidarcore.errors import MotionError
 from lidarcore.geometry import UncertainPose, relative
 from lidarcore.mapping.matching.odometry_calibration import OdometryCalibration
 from lidarcore.mapping.matching.persistence import Persistence
-from lidarcore.mapping.matching.sweep import elapsed
+from lidarcore.mapping.motion.sweep import elapsed
 from lidarcore.mapping.settings import FrontSettings
 from lidarcore.scan import Scan
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.geometry import compose, inverse, relative, rotate
-from lidarcore.mapping.matching.jerk import Drive, estimated, window
-from lidarcore.mapping.matching.jerk_fits import Window
-from lidarcore.mapping.matching.sweep import PAUSE
+from lidarcore.mapping.motion.jerk import Drive, estimated, window
+from lidarcore.mapping.motion.jerk_fits import Window
+from lidarcore.mapping.motion.sweep import PAUSE
 
 _SCANS = 7
 """Scans that tell a speed: as many at an end, where those nearest to it would not tell how steady the drive is.

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array, Bools, Ints
-from lidarcore.mapping.matching.jerk_fits import Window, evidences, mix
-from lidarcore.mapping.matching.white_jerk import STRETCHES, wander
+from lidarcore.mapping.motion.jerk_fits import Window, evidences, mix
+from lidarcore.mapping.motion.white_jerk import STRETCHES, wander
 
 JERKS = np.array([0.001, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0])[:, None] * [1.0, 1.0, 2.0]
 """What may change an acceleration within a second, from the steadiest drive to the jerkiest: m/s², m/s², rad/s²."""
