@@ -37,8 +37,11 @@ CORRIDOR = World(np.concatenate([side(-1.2, -0.25), side(1.2, 0.25)]))
 FURNISHED = World(np.concatenate([CORRIDOR.walls, box(22.6, 0.7), box(25.4, -1.2), box(27.0, 0.7)]))
 
 
-def newest_on_first(world, off):
-    """A pass along a corridor, and a few nodes of a second one that the graph has `off` m too far along."""
+def newest_on_first(world, off, sigma=2.5):
+    """A pass along a corridor, and a few nodes of a second one that the graph has `off` m too far along.
+
+    As far as the graph knows, that is uncertain by sigma m.
+    """
     rng = np.random.default_rng(3)
     first = np.stack([np.arange(6.0, 42.0, 0.5), np.zeros(72), np.zeros(72)], -1)
     second = HERE + np.stack([np.arange(-BEFORE, 1) * 0.5, np.zeros(5), np.zeros(5)], -1)
@@ -47,7 +50,7 @@ def newest_on_first(world, off):
     for k in range(1, len(truth)):
         step, tight = relative(truth[k - 1], truth[k]), np.diag([0.01, 0.01, 0.002]) ** 2
         if k == len(first):
-            step, tight = step + np.array([off, 0.0, 0.0]), np.diag([2.5, 0.3, 0.03]) ** 2
+            step, tight = step + np.array([off, 0.0, 0.0]), np.diag([sigma, 0.3, 0.03]) ** 2
         graph.connect(k - 1, graph.add(compose(graph.poses[k - 1], step)), step, tight)
     keyframes = {}
     for k, pose in enumerate(truth):
@@ -59,7 +62,7 @@ def newest_on_first(world, off):
 def places(world, off):
     """Metres along the corridor by which each place that is found is off; the best one first."""
     truth, graph, keyframes = newest_on_first(world, off)
-    passes, k = Passes(graph, keyframes, LOOPS, MATCH.reach), len(truth) - 1
+    passes, k = Passes(graph, keyframes, LOOPS, MATCH), len(truth) - 1
     hypotheses = Hypotheses(graph, keyframes, passes, LOOPS, MATCH)
     ((i, P),) = passes.worth_a_match(k)
     found = hypotheses.at(i, k, P, passes.seen(k, np.arange(k - BEFORE, k + 1)))
@@ -72,10 +75,17 @@ def test_the_true_place_is_found_wherever_the_graph_expects_it(off):
     assert np.abs(places(FURNISHED, off)).min() < 0.1
 
 
+@pytest.mark.parametrize(("sigma", "count"), [(MATCH.max_shift / 2, 1), (2 * MATCH.max_shift, 0)])
+def test_what_is_vaguer_than_a_search_looks_far_is_not_searched(sigma, count):
+    """It would be found by chance, and such searches took most of the time where the pose was lost often."""
+    truth, graph, keyframes = newest_on_first(FURNISHED, 0.0, sigma)
+    assert len(Passes(graph, keyframes, LOOPS, MATCH).worth_a_match(len(truth) - 1)) == count
+
+
 def test_what_was_seen_just_before_is_a_place_too():
     """An island that is joined to the last keyframes before it: they are no farther back than one pass of loops."""
     truth, graph, keyframes = newest_on_first(FURNISHED, 0.0)
-    passes, k = Passes(graph, keyframes, LOOPS, MATCH.reach), len(truth) - 1
+    passes, k = Passes(graph, keyframes, LOOPS, MATCH), len(truth) - 1
     assert passes.around(k - 3, k, 0.0).tolist() == [k - 7, k - 6, k - 5, k - 4, k - 3]
     assert passes.around(40, k, 0.0).tolist() == list(range(36, 45))
     assert passes.around(40, k, 4.2).tolist() == list(range(32, 49))
@@ -98,7 +108,7 @@ def test_what_nodes_saw_together_is_what_each_saw_seen_from_one_of_them():
     """But for what says how walls lie, and nothing of where they are seen."""
     truth, graph, keyframes = newest_on_first(FURNISHED, 0.0)
     nodes = np.array([30, 31, 35])
-    seen = Passes(graph, keyframes, LOOPS, MATCH.reach).seen(32, nodes)
+    seen = Passes(graph, keyframes, LOOPS, MATCH).seen(32, nodes)
     assert any((keyframes[node].patches.counts == 0).any() for node in nodes)
     near = [keyframes[node].patches.near for node in nodes]
     in_map = [act(truth[node], one.means) for node, one in zip(nodes, near, strict=True)]
@@ -111,6 +121,6 @@ def test_a_pass_ends_where_the_way_leads_away_for_more_than_two_nodes(found):
     near, graph = {5, 6, 7, 8, 9, 12, 13, 14, 18, 19, 20, 40}, PoseGraph()
     for node in range(1, 61):
         graph.add([0.0 if node in near else 50.0, 0.0, 0.0])
-    passes = Passes(graph, {}, LoopSettings(before=0), MATCH.reach)
+    passes = Passes(graph, {}, LoopSettings(before=0), MATCH)
     for i in found:
         assert passes.around(i, 60, 1.0).tolist() == found

@@ -28,7 +28,7 @@ class LoopFinder:
         self, graph: JointPoses, keyframes: dict[int, Keyframe], loops: LoopSettings, match: MatchSettings
     ) -> None:
         self._graph, self._settings, self._farthest = graph, loops, match.max_shift
-        self._passes = Passes(graph, keyframes, loops, match.reach)
+        self._passes = Passes(graph, keyframes, loops, match)
         self._hypotheses = Hypotheses(graph, keyframes, self._passes, loops, match)
         self._waiting: list[Loop] = []
         self._gate = float(chi_square_gate(loops.gate, 3))

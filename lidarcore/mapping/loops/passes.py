@@ -11,7 +11,7 @@ from lidarcore.mapping.loops.consistency import spread
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.matching.patches import Patches, joined, placed
 from lidarcore.mapping.matching.sight import agreement
-from lidarcore.mapping.settings import VAGUE, LoopSettings
+from lidarcore.mapping.settings import VAGUE, LoopSettings, MatchSettings
 
 _MARGIN = 0.3  # m by which surfaces may seem to be off where an overlap is guessed
 # A relative pose known this well (m, m, rad) gains nothing from a loop.
@@ -21,13 +21,15 @@ _KNOWN = np.array([0.04, 0.04, 0.015])
 class Passes:
     """Of the keyframes of a graph, by their nodes.
 
-    reach  m: a pose that three standard deviations leave farther open is too vague for its tie to be believed alone
+    match  a pose that three standard deviations leave open farther than its reach is too vague for its tie to be
+           believed alone; what is vaguer than a search looks far would be found by chance only
     """
 
     def __init__(
-        self, graph: JointPoses, keyframes: dict[int, Keyframe], settings: LoopSettings, reach: float
+        self, graph: JointPoses, keyframes: dict[int, Keyframe], settings: LoopSettings, match: MatchSettings
     ) -> None:
-        self._graph, self._keyframes, self._settings, self._reach = graph, keyframes, settings, reach
+        self._graph, self._keyframes, self._settings = graph, keyframes, settings
+        self._reach, self._farthest = match.reach, match.max_shift
 
     def worth_a_match(self, k: int) -> list[tuple[int, Array]]:
         """Earlier nodes to match node k with, and the covariance of k seen from there: the best of each pass nearby."""
@@ -40,7 +42,9 @@ class Passes:
             closest = int(run[np.argmin(distances[run])])
             P = self._graph.relative(closest, k)[1]
             radius = min(settings.distance + settings.sigmas * spread(P), settings.farthest)
-            if P[2, 2] > VAGUE**2 or distances[closest] > radius or (np.diagonal(P) < _KNOWN**2).all():
+            if P[2, 2] > VAGUE**2 or spread(P) > self._farthest or distances[closest] > radius:
+                continue
+            if (np.diagonal(P) < _KNOWN**2).all():
                 continue
             if np.linalg.eigvalsh(P)[0] <= 0:  # of islands, rounding may leave nothing
                 continue

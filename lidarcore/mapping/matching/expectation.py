@@ -41,9 +41,10 @@ class Expectation(NamedTuple):
     def likelihood(self, other: Registration, best: Registration, n: int) -> float:
         """Of another pose of n patches, if it fits worse than the best one by chance: beside 1 for the best one."""
         less = max(best.inliers - other.inliers, 0.0)
-        variance = (2 - best.inliers - other.inliers) / n  # of two shares
+        variance = (2 - best.inliers - other.inliers) / n  # of two shares; of none where both are whole
+        worse = less**2 / variance if less > 0 else 0.0
         farther = max(self.cost(other.pose) - self.cost(best.pose), 0.0)
-        return float(np.exp(-(less**2 / variance + farther) / 2))
+        return float(np.exp(-(worse + farther) / 2))
 
     def leaves_open(self, places: Array) -> bool:
         """Whether it may put points (N, 2) of the scan far from where they are."""

@@ -69,7 +69,7 @@ class FrontEnd:
         wheels = driven.pose / dt if scan.odometry is not None and dt > 0 else None
         expected = self._map.expects(guess)
         scan, seen, registered = self._registered(self._sweep.remove(scan, wheels, removed), expected, dt)
-        matched, tie, on = self._judged(seen, guess, expected, registered)
+        matched, tie, on = self._judged(scan, seen, guess, expected, registered)
         is_blind = len(seen.near_means) < BLIND
         island = not is_blind and not on and bool(tie.covariance[2, 2] > VAGUE**2)
         self._prediction.go_on(scan, self._known, guess, matched, dt, on)
@@ -115,10 +115,15 @@ class FrontEnd:
         return scan, seen, registered
 
     def _judged(
-        self, seen: Patches, guess: UncertainPose, expected: Expectation, registered: Registration
+        self,
+        scan: Scan,
+        seen: Patches,
+        guess: UncertainPose,
+        expected: Expectation,
+        registered: Registration,
     ) -> tuple[UncertainPose, UncertainPose, bool]:
         """Where it was matched, or guessed; the same as uncertain as it stands; and whether it lies on the map."""
-        rival = self._map.rival(seen, expected, registered)
+        rival = self._map.rival(scan, seen, expected, registered)
         is_chance = self._map.is_chance(seen, expected, registered)
         on = registered.inliers >= self._settings.inliers and not is_chance and rival is None
         matched = guess

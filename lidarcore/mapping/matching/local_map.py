@@ -23,6 +23,7 @@ _FURTHER = 3.0  # times as far is looked for a scan that does not fit
 _APART, _TURNED = 0.5, 0.25  # m and rad from which on two poses are not the same
 _BETTER = 0.02  # share of a scan by which a pose that was searched for must be better than that of the guess
 _RIVAL = 0.85  # of the share of a scan on the map, from which on another pose is a rival
+_OPEN = 0.3  # likelihood beside 1 of the best pose, from which on another one is its rival, too
 _RIVALS = 8  # other poses that are looked at
 
 
@@ -90,9 +91,11 @@ class LocalMap:
         better = expected.worth(other, n) > expected.worth(registered, n) + _BETTER * n
         return other if better else registered
 
-    def rival(self, seen: Patches, expected: Expectation, registered: Registration) -> Array | None:
-        """Another pose (3,) at which a scan that fits badly fits nearly as well, if the guess leaves it open."""
-        if not self._settings.inliers <= registered.inliers < SURE:
+    def rival(
+        self, scan: Scan, seen: Patches, expected: Expectation, registered: Registration
+    ) -> Array | None:
+        """Another pose (3,) at which a scan fits nearly as well, if the guess and what was seen leave it open."""
+        if registered.inliers < self._settings.inliers:
             return None
         reference, near = self._surfels.means[self._surfels.near], seen.near_means
         if len(near) < BLIND or 3 * np.hypot(*expected.sigma[:2]) < _APART:
@@ -101,9 +104,18 @@ class LocalMap:
         others = candidates(reference, near, expected.pose, expected.sigma, match, besides)
         for start in islice(others, _RIVALS):
             other = self.registered_from(start, seen, expected)
-            if other.inliers >= _RIVAL * registered.inliers and _apart(registered.pose, other.pose):
+            if self._is_open(other, registered, expected, len(near)) and not self._refutes(
+                scan, other.pose, registered.pose, len(near)
+            ):
                 return other.pose
         return None
+
+    @staticmethod
+    def _is_open(other: Registration, best: Registration, expected: Expectation, count: int) -> bool:
+        """Whether a scan of so many patches fits another pose so well that it may have been taken there."""
+        if other.inliers < _RIVAL * best.inliers or not _apart(best.pose, other.pose):
+            return False
+        return best.inliers < SURE or expected.likelihood(other, best, count) > _OPEN
 
     def scatter(self, seen: Patches, expected: Expectation, registered: Registration) -> Array:
         """(3, 3) of how far from where it was registered a scan fits as well, or worse only by chance.
