@@ -134,14 +134,27 @@ def test_the_search_finds_the_best_pose_of_its_window_and_the_best_one_besides()
         assert other == pytest.approx(next(besides(before)))  # as if looked for alone
 
 
-def test_a_place_far_from_the_guess_wins_if_more_fits_there_than_the_way_costs():
-    """30 points fit there, which costs 4; beside the guess 23 do, and the others are not far, as looks promising."""
+FAR = np.array([3.4, 0.0])
+
+
+def two_places():
+    """What `search` takes: 30 points fit at FAR, which costs 4; 23 at the guess, and the others there are not far."""
     points = np.random.default_rng(5).uniform(-6, 6, (30, 2))
-    far, beside = np.array([3.4, 0.0]), np.where(np.arange(30)[:, None] < 23, 0.0, 0.35)
-    settings = MatchSettings(cell=0.1, blur=0.1, max_shift=3.6)
-    reference, sigma = np.vstack([points + far, points + beside]), np.array([1.2, 1.2, 0.02])
-    found = search(reference, points, np.zeros(3), sigma, settings)
-    np.testing.assert_allclose(found, [*far, 0.0], atol=0.06)
+    beside = np.where(np.arange(30)[:, None] < 23, 0.0, 0.35)
+    reference, sigma = np.vstack([points + FAR, points + beside]), np.array([1.2, 1.2, 0.02])
+    return reference, points, np.zeros(3), sigma, MatchSettings(cell=0.1, blur=0.1, max_shift=3.6)
+
+
+def test_a_place_far_from_the_guess_wins_if_more_fits_there_than_the_way_costs():
+    """Beside the guess more looks promising."""
+    np.testing.assert_allclose(search(*two_places()), [*FAR, 0.0], atol=0.06)
+
+
+def test_places_end_where_too_little_is_left_that_fits():
+    """At most 26 of 30, as the way costs 4; where no point was copied to, few fit by chance."""
+    found = list(islice(candidates(*two_places(), least=0.4), 5))
+    np.testing.assert_allclose(found, [[*FAR, 0.0], [0.0, 0.0, 0.0]], atol=0.06)
+    assert not list(candidates(*two_places(), least=0.9))
 
 
 def test_surfels_are_the_weighted_means_of_the_patches_in_their_cells():

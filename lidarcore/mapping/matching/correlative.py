@@ -57,10 +57,12 @@ def candidates(
     sigma: Array,
     settings: MatchSettings,
     besides: Array = _NO_POSES,
+    least: float = -np.inf,
 ) -> Iterator[Array]:
     """The best pose (3,) that `search` finds, then the best one that is not close to it, and so on.
 
-    None is close to a pose of `besides` (E, 3) either: what else might it be?
+    None is close to a pose of `besides` (E, 3) either: what else might it be? They end where none is left of which more
+    than a share `least` of the points fits, less what it costs to contradict the guess.
     """
     most = np.minimum(_REACH * sigma, [settings.max_shift, settings.max_shift, settings.max_turn])
     cell = settings.cell * (2 if most[:2].max() > _WIDE else 1)
@@ -88,7 +90,9 @@ def candidates(
     while True:
         others = (besides - guess) / unit
         others[:, 2] = wrap(others[:, 2])
-        shift = _search(fine, blocks, cells, bounds, known, order, others, window)
+        total, *shift = _search(fine, blocks, cells, bounds, known, order, others, window, least * len(near))
+        if total <= least * len(near):
+            return
         found: Array = guess + np.array(shift) * unit
         yield found
         besides = np.concatenate([besides, found[None]])
@@ -110,14 +114,17 @@ def _search(
     order: Ints,
     others: Array,
     window: _Window,
-) -> tuple[float, float, float]:
-    """Best shift, in cells, and turn that is not close to one of others (E, 3): looks into blocks in the order given.
+    least: float,
+) -> tuple[float, float, float, float]:
+    """Largest score above `least`, and its shift, in cells, and turn, not close to one of others (E, 3); else `least`.
+
+    Looks into blocks in the order given.
 
     Blocks that were looked into are known better than by their bounds afterwards.
     """
     turns, half, scores = window.turns, window.half, np.empty((BLOCK, BLOCK), np.float32)
     flat, limits = bounds.ravel(), known.ravel()
-    best, best_u, best_v, best_turn = -np.inf, 0, 0, 0.0
+    best, best_u, best_v, best_turn = least, 0, 0, 0.0
     for n in order:
         if flat[n] <= best:
             break
@@ -136,7 +143,7 @@ def _search(
                 limits[n] = max(limits[n], total)
                 if total > best and not _is_close(others, window.close, du, dv, turns[t]):
                     best, best_u, best_v, best_turn = total, du, dv, turns[t]
-    return best_u, best_v, best_turn
+    return best, best_u, best_v, best_turn
 
 
 @kernel

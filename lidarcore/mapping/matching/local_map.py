@@ -25,6 +25,7 @@ _BETTER = 0.02  # share of a scan by which a pose that was searched for must be 
 _RIVAL = 0.85  # of the share of a scan on the map, from which on another pose is a rival
 _OPEN = 0.3  # likelihood beside 1 of the best pose, from which on another one is its rival, too
 _RIVALS = 8  # other poses that are looked at
+_ROUGHLY = 0.5  # of the share of a scan on the map, that fits another pose in the cells of a search, at least
 
 
 class LocalMap:
@@ -101,7 +102,8 @@ class LocalMap:
         if len(near) < BLIND or 3 * np.hypot(*expected.sigma[:2]) < _APART:
             return None
         match, besides = self._settings.match, registered.pose[None]
-        others = candidates(reference, near, expected.pose, expected.sigma, match, besides)
+        least = _ROUGHLY * registered.inliers
+        others = candidates(reference, near, expected.pose, expected.sigma, match, besides, least)
         for start in islice(others, _RIVALS):
             other = self.registered_from(start, seen, expected)
             if self._is_open(other, registered, expected, len(near)) and not self._refutes(
