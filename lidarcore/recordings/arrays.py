@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from lidarcore.files.streams import MEBIBYTE
-from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
+from lidarcore.recordings.base import Recording
+from lidarcore.recordings.pace import period
 from lidarcore.scan import Scan
 
 NAMES = {
@@ -104,8 +105,11 @@ class ArrayRecording(Recording):
         if len(returned) and np.median(returned) > FARTHEST:
             raise self._error(f"has a median range of {np.median(returned):.6g}: expected are metres.")
         if "stamps" not in self._columns:
-            self._columns["stamps"] = NOMINAL_PERIOD * np.arange(len(ranges), dtype=np.float64)
-            self._remark(f"There are no stamps: scans are taken to be {NOMINAL_PERIOD} s apart.")
+            seconds = period(
+                next((self._columns[name] for name in _POSES if name in self._columns), np.empty((0, 3)))
+            )
+            self._columns["stamps"] = seconds * np.arange(len(ranges), dtype=np.float64)
+            self._remark(f"There are no stamps: scans are taken to be {seconds:g} s apart.")
 
     def _scans(self) -> Iterator[Callable[[], Scan]]:
         names = {name: "stamp" if name == "stamps" else name for name in self._columns}

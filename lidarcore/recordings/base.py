@@ -15,9 +15,6 @@ from lidarcore.files import reason
 from lidarcore.files.streams import MEBIBYTE, available, open_stream, whole
 from lidarcore.scan import Array, Scan
 
-NOMINAL_PERIOD = 0.1
-"""s between scans where a file does not say: the usual 10 Hz of a small lidar."""
-
 MOST_BEAMS = 1 << 18
 """Beams of a scan at most: ten times those of the densest 2D lidar."""
 

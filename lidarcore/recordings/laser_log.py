@@ -11,8 +11,9 @@ import numpy as np
 
 from lidarcore.files.streams import lines
 from lidarcore.geometry import compose
-from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
+from lidarcore.recordings.base import Recording
 from lidarcore.recordings.laser_survey import SICK_RANGE, Survey
+from lidarcore.recordings.pace import period
 from lidarcore.scan import Array, Scan
 
 SICK_STEPS = {180: 1.0, 181: 1.0, 360: 0.5, 361: 0.5, 400: 0.25, 401: 0.25}
@@ -79,7 +80,9 @@ class LaserLog(Recording):
         surveys: defaultdict[str, Survey] = defaultdict(Survey)
         for reading in self._readings():
             survey = surveys[reading.topic]
-            survey.add(reading.ranges, reading.stamps, has_bearings=reading.bearings is not None)
+            survey.add(
+                reading.ranges, reading.stamps, reading.pose, has_bearings=reading.bearings is not None
+            )
             if reading.pose is not None and reading.base_pose is not None:
                 survey.mounting.add(reading.base_pose, reading.pose)
         if not surveys:
@@ -98,7 +101,7 @@ class LaserLog(Recording):
             span = np.degrees(np.ptp(sick_bearings(beams)))
             self._remark(f"The log gives no angles: {beams} beams are taken to span {span:.4g} degrees.")
         self._marker = self._find_marker(survey)
-        self._stamps = self._settle_stamps(survey.stamps())
+        self._stamps = self._settle_stamps(survey)
 
     def _is_whole(self, line: bytes) -> bool:
         """Whether a last line without an end surely lacks nothing, not even digits of its last number."""
@@ -136,8 +139,9 @@ class LaserLog(Recording):
         self._remark(f"{survey.ties} readings are {largest}: taken to mean no return.")
         return survey.largest
 
-    def _settle_stamps(self, candidates: Array) -> Array:
-        """Stamps (N,) s: the first column of candidates (N, kinds) that mostly grows, or file order."""
+    def _settle_stamps(self, survey: Survey) -> Array:
+        """Stamps (N,) s: of those that readings may have, the first kind that mostly grows, or file order."""
+        candidates = survey.stamps()
         for stamps in candidates.T:
             steps = np.diff(stamps)
             if np.isfinite(stamps).all() and stamps.any() and (len(steps) == 0 or np.median(steps) > 0):
@@ -147,10 +151,9 @@ class LaserLog(Recording):
                     mended = ": scans are put in their order" if self._late else ""
                     self._remark(f"The stamps go back in time {often}{mended}.")
                 return np.array(stamps, np.float64)
-        self._remark(
-            f"The stamps are zero or rounded: scans are taken in file order, {NOMINAL_PERIOD} s apart."
-        )
-        return NOMINAL_PERIOD * np.arange(len(candidates), dtype=np.float64)
+        seconds = period(survey.poses())
+        self._remark(f"The stamps are zero or rounded: scans are taken in file order, {seconds:g} s apart.")
+        return seconds * np.arange(len(candidates), dtype=np.float64)
 
     def _scans(self) -> Iterator[Callable[[], Scan]]:
         chosen = (reading for reading in self._readings() if reading.topic == self.topic)

@@ -1,4 +1,4 @@
-"""What all lines of one laser together say, gathered line by line: only the stamps are kept of each."""
+"""What all lines of one laser together say, gathered line by line: only stamps and poses are kept of each."""
 
 from array import array
 
@@ -27,13 +27,18 @@ class Survey:
         self.mounting = Mounting()
         self._histogram = np.zeros(int(SICK_RANGE) * _PER_METRE, np.int64)
         self._stamps, self._kinds = array("d"), 1
+        self._poses = array("d")
 
-    def add(self, ranges: Array, stamps: tuple[float, ...], *, has_bearings: bool) -> None:
-        """Take up a reading: ranges (N,) m, and what its stamp may be."""
+    def add(
+        self, ranges: Array, stamps: tuple[float, ...], pose: Array | None = None, *, has_bearings: bool
+    ) -> None:
+        """Take up a reading: ranges (N,) m, what its stamp may be, and the pose (3,) m, m, rad if there is any."""
         if not has_bearings:
             self.beams.add(len(ranges))
         self._stamps.extend(stamps)
         self._kinds = len(stamps)
+        if pose is not None:
+            self._poses.extend(pose)
         below = ranges[(ranges >= 0) & (ranges < SICK_RANGE)]
         np.add.at(self._histogram, (below * _PER_METRE).astype(np.int64), 1)
         largest = float(below.max(initial=0))
@@ -48,6 +53,10 @@ class Survey:
     def stamps(self) -> Array:
         """Candidates (N, kinds) s."""
         return np.frombuffer(self._stamps).reshape(-1, self._kinds)
+
+    def poses(self) -> Array:
+        """(M, 3) m, m, rad of the readings that have one."""
+        return np.frombuffer(self._poses).reshape(-1, 3)
 
 
 class Mounting:

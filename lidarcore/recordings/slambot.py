@@ -40,8 +40,9 @@ class SlambotLog(LaserLog):
         ticks = np.frombuffer(self._counters).reshape(-1, 2)
         self._track = PoseTrack(self._stamps, dead_reckoning(self._without_jumps(ticks), _TICK, _TRACK_WIDTH))
 
-    def _settle_stamps(self, candidates: Array) -> Array:
+    def _settle_stamps(self, survey: Survey) -> Array:
         """Stamps (N,) s: the counter wraps every 65.5 s and only goes on."""
+        candidates = survey.stamps()
         steps = np.diff(candidates[:, 0]) % 2**16
         return np.cumsum(np.append(candidates[:1, 0], steps)) / 1000
 

@@ -11,7 +11,7 @@ from lidarcore.body_mask import Sector, as_text
 from lidarcore.closing import Closing
 from lidarcore.features import Features
 from lidarcore.files.growing_file import GrowingFile
-from lidarcore.recordings.base import NOMINAL_PERIOD
+from lidarcore.recordings.pace import NOMINAL_PERIOD
 from lidarcore.recordings.ros.mcap import MAGIC, MASK, METADATA, SENSOR
 from lidarcore.recordings.ros.messages import typestore
 from lidarcore.scan import Scan

@@ -64,6 +64,15 @@ def test_all_columns_arrive(saved):
         assert scan.stamp == [5.0, 5.5, 6.0][index]
 
 
+def test_scans_without_stamps_come_as_far_apart_as_a_robot_of_a_metre_a_second_needs(saved):
+    poses = np.array([[0, 0, 0], [0.7, 0, 0], [1.4, 0, 0]])
+    recording = open_recording(saved(ranges=RANGES, bearings=BEARINGS, odometry=poses))
+    assert [scan.stamp for scan in recording] == pytest.approx([0.0, 0.7, 1.4])
+    assert "There are no stamps: scans are taken to be 0.7 s apart." in recording.notes
+    without = open_recording(saved(ranges=RANGES, bearings=BEARINGS))
+    assert [scan.stamp for scan in without] == pytest.approx([0.0, 0.1, 0.2])
+
+
 def test_one_scan_may_be_a_vector(saved):
     (scan,) = open_recording(saved(ranges=RANGES[0], angles=BEARINGS))
     np.testing.assert_array_equal(scan.ranges, RANGES[0])

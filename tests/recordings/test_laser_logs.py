@@ -55,8 +55,15 @@ def test_rounded_stamps_give_way_to_the_order_of_the_file(data):
     path = data / CARMEN / "belgioioso-corrected.log.gz"
     assert len({words[-3] for words in flasers(path)}) < 10
     recording = open_recording(path)
-    assert [scan.stamp for scan in recording] == pytest.approx(0.1 * np.arange(395))
-    assert any("zero or rounded" in note for note in recording.notes)
+    x, y, headings = np.array([words[-9:-6] for words in flasers(path)], float).T
+    seconds = np.maximum(np.hypot(np.diff(x), np.diff(y)), np.abs(np.diff(np.unwrap(headings)))).mean()
+    assert [scan.stamp for scan in recording] == pytest.approx(round(seconds, 2) * np.arange(395))
+    assert any("zero or rounded" in note and f"{seconds:.2f} s apart" in note for note in recording.notes)
+
+
+def test_stamps_of_zero_in_a_log_of_a_robot_that_stands_give_way_to_ten_scans_a_second(tmp_path):
+    scans = open_recording(log(tmp_path, *(flaser(0) for _ in range(4))))
+    assert [scan.stamp for scan in scans] == pytest.approx([0.0, 0.1, 0.2, 0.3])
 
 
 def test_lines_that_were_written_late_are_put_in_their_order(tmp_path):

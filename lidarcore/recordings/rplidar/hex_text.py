@@ -6,7 +6,8 @@ from dataclasses import replace
 from functools import partial
 from itertools import chain
 
-from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
+from lidarcore.recordings.base import Recording
+from lidarcore.recordings.pace import NOMINAL_PERIOD
 from lidarcore.rplidar.listener import BEGINNING, Listener
 from lidarcore.rplidar.protocol import Answer, Descriptor, Revolution
 from lidarcore.scan import Scan

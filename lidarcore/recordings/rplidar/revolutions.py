@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.recordings.base import NOMINAL_PERIOD, Recording
+from lidarcore.recordings.base import Recording
+from lidarcore.recordings.pace import NOMINAL_PERIOD
 from lidarcore.scan import Scan
 
 WHOLE = 0.75

@@ -1,0 +1,27 @@
+"""How long after each other scans are taken to come where a file does not say."""
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import relative
+
+NOMINAL_PERIOD = 0.1
+"""s between scans where nothing tells: the usual 10 Hz of a small lidar."""
+
+_SPEED, _TURN_RATE = 1.0, 1.0  # m/s and rad/s of a robot among people
+_LONGEST = 5.0  # s that a step counts, at most: poses that jump are no motion
+
+
+def period(poses: Array) -> float:
+    """s between scans that were taken at poses (T, 3) m, m, rad: as if the robot moved at 1 m/s or turned at 1 rad/s.
+
+    Many logs keep a scan for every half metre or metre only. Taken to come ten times a second, they would tell of a
+    robot of 10 m/s, and whatever expects a robot to go on as it did would be far too sure of that. Never less than
+    NOMINAL_PERIOD.
+    """
+    if len(poses) < 2:
+        return NOMINAL_PERIOD
+    x, y, turn = relative(poses[:-1], poses[1:]).T
+    took = np.maximum(np.hypot(x, y) / _SPEED, np.abs(turn) / _TURN_RATE)
+    mean = float(np.minimum(took[np.isfinite(took)], _LONGEST).sum()) / len(took)
+    return max(round(mean, 2), NOMINAL_PERIOD)
