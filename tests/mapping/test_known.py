@@ -184,6 +184,19 @@ def test_a_corridor_of_equal_doors_is_closed_once_surfaces_say_where_it_leads():
     assert mapper.loops
 
 
+def test_a_keyframe_that_saw_too_little_is_a_part_of_its_own_that_no_other_knows():
+    graph = chain(12)
+    reaches = everywhere(graph)
+    reaches[[0, 7]] = 0.0
+    found = known(graph, 5.0, steps(graph), reaches)
+    assert found.part.tolist() == [0] + 6 * [1] + [2] + 4 * [3]
+    others = np.ix_([1, 3], [1, 3])
+    assert found.pairs[others].all()
+    assert found.pairs.sum() == 4 + 2
+    assert not np.isin(near_unknown(graph, found, 1.0), [1, 8]).any()
+    assert (known_besides(found, graph, 5.0).pairs == found.pairs).all()
+
+
 def test_a_pass_that_no_loop_ties_is_not_taken_for_another_one(data):
     """With every other scan of a real building no loop ties the last pass, which comes near the first one.
 

@@ -30,7 +30,7 @@ class Known(NamedTuple):
 
     part     (K,) number of the part that each keyframe is of
     pairs    (S, S) of the parts; not told of two that lie too far apart to have seen a surface both
-    reaches  (K,) m, how far each keyframe saw
+    reaches  (K,) m, how far each keyframe saw; 0 if it saw so little that no surface is known to be another's, too
     """
 
     part: Ints
@@ -42,9 +42,11 @@ def known(joint: JointPoses, within: float, steps: Array, reaches: Array) -> Kno
     """The parts of a way; two are known if the place of one, seen from the other, has a deviation below `within` m.
 
     steps (K - 1, 3, 3) are the covariances of the keyframes, each seen from the one before it. Neighbours are known if
-    the step between them is. reaches (K,) m tell how far each keyframe saw.
+    the step between them is, unless one saw too little: reaches (K,) m tell how far each saw, 0 if that is so.
     """
-    part, reached = _parts(steps[:, 0, 0] + steps[:, 1, 1], within**2)
+    variances = steps[:, 0, 0] + steps[:, 1, 1]
+    variances[(reaches[:-1] == 0) | (reaches[1:] == 0)] = np.inf
+    part, reached = _parts(variances, within**2)
     pairs = np.eye(part[-1] + 1, dtype=bool)
     a = np.flatnonzero(reached)
     pairs[a, a + 1] = pairs[a + 1, a] = True
@@ -90,9 +92,9 @@ def _overlap(parts: Known, poses: Array) -> Bools:
     begins = np.flatnonzero(np.diff(parts.part, prepend=-1))
     centres = np.add.reduceat(poses[:, :2], begins) / np.bincount(parts.part)[:, None]
     farthest = np.hypot(*(poses[:, :2] - centres[parts.part]).T) + parts.reaches
-    radii = np.maximum.reduceat(farthest, begins)
+    radii, tells = np.maximum.reduceat(farthest, begins), np.maximum.reduceat(parts.reaches, begins) > 0
     found: Bools = np.hypot(*(centres[:, None] - centres).T) < radii[:, None] + radii
-    return found
+    return found & tells[:, None] & tells
 
 
 def _middle(parts: Known, number: int) -> int:

@@ -16,7 +16,8 @@ from lidarcore.mapping.loops.keyframes import Keyframe, View
 from lidarcore.mapping.loops.steps import Steps
 from lidarcore.mapping.loops.thinning import spare
 from lidarcore.mapping.matching.distortion import seen_since
-from lidarcore.mapping.matching.patches import patches
+from lidarcore.mapping.matching.local_map import is_blind
+from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.sight import sight
 from lidarcore.mapping.motion.sweep import without
 from lidarcore.mapping.settings import MapperSettings
@@ -155,8 +156,7 @@ class BackEnd:
         return refined
 
     def _parts(self) -> Known:
-        means = (keyframe.patches.means for keyframe in self.keyframes.values())
-        reaches = np.array([np.hypot(*of_one.T).max(initial=0.0) for of_one in means])
+        reaches = np.array([_reach(keyframe.patches) for keyframe in self.keyframes.values()])
         return known(self.graph, self._settings.front.match.reach, self._steps.covariances(), reaches)
 
     def _refined(self, parts: Known) -> Refined:
@@ -206,6 +206,12 @@ class BackEnd:
 
 def _keyframe(tracked: Tracked) -> Keyframe:
     return Keyframe(tracked.number, tracked.scan, tracked.patches, sight(tracked.scan), tracked.sweep)
+
+
+def _reach(seen: Patches) -> float:
+    """How far (m) patches were seen; 0 if they are too few, as in a first scan that is not whole: they would fit
+    anywhere, and a finished map be sure of the place at which it took them for those of others."""
+    return 0.0 if is_blind(seen) else float(np.hypot(*seen.means.T).max())
 
 
 def _agrees(loop: Loop, poses: Array) -> bool:

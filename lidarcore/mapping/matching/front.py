@@ -8,7 +8,7 @@ from lidarcore.arrays import Array
 from lidarcore.errors import MotionError
 from lidarcore.geometry import HERE, UncertainPose
 from lidarcore.mapping.matching.expectation import Expectation
-from lidarcore.mapping.matching.local_map import BLIND, SURE, LocalMap
+from lidarcore.mapping.matching.local_map import SURE, LocalMap, is_blind
 from lidarcore.mapping.matching.patches import Patches, patches
 from lidarcore.mapping.matching.prediction import Prediction
 from lidarcore.mapping.matching.registration import Registration
@@ -70,12 +70,12 @@ class FrontEnd:
         expected = self._map.expects(guess)
         scan, seen, registered = self._registered(self._sweep.remove(scan, wheels, removed), expected, dt)
         matched, tie, on = self._judged(scan, seen, guess, expected, registered)
-        is_blind = len(seen.near_means) < BLIND
-        island = not is_blind and not on and bool(tie.covariance[2, 2] > VAGUE**2)
+        sees = not is_blind(seen)
+        island = sees and not on and bool(tie.covariance[2, 2] > VAGUE**2)
         self._prediction.go_on(scan, self._known, guess, matched, dt, on)
         self._known, self._moved = tie, moved
         tie = UncertainPose(tie.pose, tie.covariance + self._prediction.astray)
-        leaves = island or (not is_blind and self._leaves(tie[0], registered.inliers))
+        leaves = island or (sees and self._leaves(tie[0], registered.inliers))
         is_view = on and not leaves and self._standing.is_due(scan.stamp, tie.pose)
         taken = None if wheels is None else self.wheels
         tracked = Tracked(

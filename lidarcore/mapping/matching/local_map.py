@@ -17,7 +17,7 @@ from lidarcore.mapping.matching.surfels import Surfels, surfels
 from lidarcore.mapping.settings import FrontSettings
 from lidarcore.scan import Scan
 
-BLIND = 20  # patches: a scan that has fewer fits anywhere
+_BLIND = 20  # patches: a scan that has fewer fits anywhere
 SURE = 0.6  # share of a scan on the map from which on it needs no search
 _FURTHER = 3.0  # times as far is looked for a scan that does not fit
 _APART, _TURNED = 0.5, 0.25  # m and rad from which on two poses are not the same
@@ -66,7 +66,7 @@ class LocalMap:
         """
         near = seen.near_means
         registered = at_guess = self.registered_from(expected.pose, seen, expected)
-        if len(near) < BLIND:
+        if is_blind(seen):
             return registered
         if registered.inliers < SURE or (expected.leaves_open(near) and registered.inliers + _BETTER < 1):
             registered = self._searched(seen, expected, expected.sigma, registered)
@@ -99,7 +99,7 @@ class LocalMap:
         if registered.inliers < self._settings.inliers:
             return None
         reference, near = self._surfels.means[self._surfels.near], seen.near_means
-        if len(near) < BLIND or 3 * np.hypot(*expected.sigma[:2]) < _APART:
+        if is_blind(seen) or 3 * np.hypot(*expected.sigma[:2]) < _APART:
             return None
         match, besides = self._settings.match, registered.pose[None]
         least = _ROUGHLY * registered.inliers
@@ -127,7 +127,7 @@ class LocalMap:
         place: a corridor looks the same both ways.
         """
         near, spread, total = seen.near_means, np.zeros((3, 3)), 1.0
-        if len(near) < BLIND or not expected.leaves_open(near) or registered.inliers + _BETTER >= 1:
+        if is_blind(seen) or not expected.leaves_open(near) or registered.inliers + _BETTER >= 1:
             return spread
         turned = min(expected.sigma[2], _TURNED)
         for turn in (-turned, turned):
@@ -168,6 +168,11 @@ class LocalMap:
         """The pose seen from the keyframe."""
         exact = UncertainPose(self._anchor, np.zeros((3, 3)))
         return exact.relative(UncertainPose(registered.pose, information_of(registered.information)))
+
+
+def is_blind(seen: Patches) -> bool:
+    """Whether a scan has so few patches that it fits anywhere."""
+    return len(seen.near_means) < _BLIND
 
 
 def _apart(a: Array, b: Array) -> bool:
