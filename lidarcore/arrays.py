@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Singles = NDArray[np.float32]
+Unsigned = NDArray[np.uint64]
 Bools = NDArray[np.bool_]
 Numbers = TypeVar("Numbers", Array, float)
 """Of functions on arrays that kernels compile for single numbers."""

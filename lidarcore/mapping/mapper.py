@@ -21,7 +21,7 @@ from lidarcore.mapping.settings import MapperSettings
 from lidarcore.mapping.tracked import Tracked
 from lidarcore.scan import Scan
 
-_SEARCHES = 2  # for passes that no loop ties: the first may bring others near enough
+_SEARCHES = 8  # for passes that no loop ties, each of which tells where others lead
 
 
 @dataclass(frozen=True, slots=True, eq=False)

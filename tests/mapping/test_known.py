@@ -1,5 +1,7 @@
 """What a graph knows of parts of a way seen from each other, and loops where passes come near that none ties."""
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from lidarcore.evaluation.maps.study import prepared
 from lidarcore.geometry import chi_square_gate, compose, pose_difference, relative, squared_mahalanobis
 from lidarcore.mapping import Mapper, PoseGraph
 from lidarcore.mapping.graph.known import Known, known, known_besides, near_unknown, parted
+from lidarcore.mapping.loops.closure import LoopFinder
 from lidarcore.recordings import open_recording
 from lidarcore.simulation import World
 from tests.mapping.mapping_scenes import NOISE, SETTINGS, sick_scan
@@ -157,10 +160,10 @@ def sides():
     return np.concatenate([*walls, np.reshape(ends, (-1, 2, 2))])
 
 
-def around():
-    """Poses (T, 3) half a metre apart: once around, and 15 m of the first corridor again."""
+def around(far=26.0):
+    """Poses (T, 3) half a metre apart: once around, and the first corridor again up to x = far m."""
     x0, x1, y0, y1 = WIDE / 2, LENGTH - WIDE / 2, WIDE / 2, DEPTH + WIDE / 2
-    corners = np.array([[10.0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0], [26.0, y0]])
+    corners = np.array([[10.0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0], [far, y0]])
     lengths = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
     along = np.arange(0, lengths[-1], 0.5)
     x, y = (
@@ -182,6 +185,28 @@ def test_a_corridor_of_equal_doors_is_closed_once_surfaces_say_where_it_leads():
     off = compose(poses[0], found[-1]) - poses[-1]
     assert np.hypot(off[0], off[1]) < 0.1
     assert mapper.loops
+
+
+def test_loops_of_a_long_pass_are_sought_no_farther_than_until_the_first_ones_tell_where_it_leads():
+    """A mapper that believes none comes round; loops of all nodes would be some 50, along 36 m of the way."""
+    poses, world = around(LENGTH - WIDE / 2), World(sides())
+    scans = [sick_scan(world, pose, NOISE, np.random.default_rng(k)) for k, pose in enumerate(poses)]
+    mapper = Mapper(
+        replace(SETTINGS, loops=replace(SETTINGS.loops, support=20, shortest=100.0, longest=100.0))
+    )
+    for scan in with_poor_odometry(scans, poses, 1):
+        mapper.step(scan)
+    assert not mapper.loops
+    found = mapper.keyframes
+    graph, keyframes = mapper._back.graph, mapper._back.keyframes
+    nodes = np.arange(1, len(graph))
+    finder, same = (LoopFinder(graph, keyframes, SETTINGS.loops, SETTINGS.front.match) for _ in range(2))
+    first, every = finder.find_first(nodes), [loop for k in nodes.tolist() for loop in same.find(k)]
+    way = np.append(0.0, np.cumsum(np.hypot(*np.diff(found.poses[:, :2], axis=0).T)))
+    assert 3 <= len(first) < len(every)
+    assert [(loop.i, loop.j) for loop in first] == [(loop.i, loop.j) for loop in every[: len(first)]]
+    assert way[max(loop.j for loop in every)] - way[first[0].j] > 2 * SETTINGS.loops.longest
+    assert way[max(loop.j for loop in first)] - way[first[0].j] < SETTINGS.loops.longest + 1
 
 
 def test_a_keyframe_that_saw_too_little_is_a_part_of_its_own_that_no_other_knows():

@@ -113,7 +113,7 @@ class BackEnd:
             self.graph.optimize(_SETTLED)
 
     def search_beside(self) -> int:
-        """Look for loops where passes come near each other that no loop ties. Returns how many were closed.
+        """Look for the first loops where passes come near each other that no loop ties. Returns how many were closed.
 
         Surfaces say far more of where a pass leads than its keyframes' ties do, as long as those of two passes that are
         not known, seen from each other, are not taken for the same ones. What that leaves open may be little enough to
@@ -125,8 +125,7 @@ class BackEnd:
             return 0
         refined = self._refined(parts)
         finder = LoopFinder(refined, self.keyframes, self._settings.loops, self._settings.front.match)
-        loops = [loop for node in nodes.tolist() for loop in finder.find(node)]
-        loops += finder.conclude()
+        loops = finder.find_first(nodes)
         if loops:
             self.graph.move(refined.poses)
         return self._close(loops)

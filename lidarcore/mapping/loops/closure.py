@@ -46,6 +46,18 @@ class LoopFinder:
             believed += self._agreeing(k)
         return believed
 
+    def find_first(self, nodes: Ints) -> list[Loop]:
+        """Loops to believe after these nodes came in, up to some way behind the first one.
+
+        What those tell of the graph makes others easier to find, or shows that nobody needs them.
+        """
+        way, found = self._way(), list[Loop]()
+        for k in nodes.tolist():
+            if found and way[k] - way[found[0].j] > self._settings.longest:
+                return found
+            found += self.find(k)
+        return found + self.conclude()
+
     def tie(self, nodes: Ints, k: int, P: Array) -> Loop | None:
         """Node k registered on the earlier node that saw most of the same; the graph has it right within P (3, 3)."""
         i = self._passes.best(nodes, k, P)

@@ -13,7 +13,7 @@ from lidarcore.arrays import Array, Ints, Singles
 from lidarcore.compiled import kernel
 from lidarcore.geometry import wrap
 from lidarcore.geometry.kernels import rotate
-from lidarcore.mapping.matching.scores import BLOCK, SHIFT, largest_around, score_grid, sum_scores
+from lidarcore.mapping.matching.scores import BLOCK, largest_around, score_grid, sum_blocks, sum_scores
 from lidarcore.mapping.settings import MatchSettings
 
 _CLOSE, _CLOSE_TURN = 0.5, 0.25  # m and rad within which two poses are one
@@ -85,13 +85,14 @@ def candidates(
     centre = np.array([*(guess[:2] - low) / cell, guess[2]])
     window = _Window(centre, half, turns, sigma / unit, np.array([_CLOSE / cell, _CLOSE_TURN]))
     cells, blocks = _cells(near / cell, window), largest_around(fine)
-    bounds = _bounds(blocks, cells, window)
-    order, known = np.argsort(-bounds, axis=None), bounds.copy()
+    bounds, fewest = _bounds(blocks, cells, window), least * len(near)
+    known, worth = bounds.copy(), np.flatnonzero(bounds > fewest)
+    order = worth[np.argsort(-bounds.ravel()[worth])]
     while True:
         others = (besides - guess) / unit
         others[:, 2] = wrap(others[:, 2])
-        total, *shift = _search(fine, blocks, cells, bounds, known, order, others, window, least * len(near))
-        if total <= least * len(near):
+        total, *shift = _search(fine, blocks, cells, bounds, known, order, others, window, fewest)
+        if total <= fewest:
             return
         found: Array = guess + np.array(shift) * unit
         yield found
@@ -162,17 +163,15 @@ def _cells(points: Array, window: _Window) -> Ints:
 def _bounds(blocks: Singles, cells: Ints, window: _Window) -> Array:
     """(T, A, B) what no shift in a block of shifts exceeds, for each turn and block."""
     turns, half = window.turns, window.half
-    bounds = np.zeros((len(turns), 2 * half[0] + 1, 2 * half[1] + 1))
+    A, B = 2 * half[0] + 1, 2 * half[1] + 1
+    sums = np.empty((len(turns), A, (B + BLOCK - 1) // BLOCK * BLOCK), np.float32)
+    sum_blocks(blocks, cells, half, sums)
+    bounds = np.empty((len(turns), A, B))
     for t in range(len(turns)):
-        for k in range(cells.shape[1]):
-            i, j = (cells[t, k, 0] >> SHIFT) - half[0], (cells[t, k, 1] >> SHIFT) - half[1]
-            for a in range(max(0, -i), min(bounds.shape[1], blocks.shape[0] - i)):
-                for b in range(max(0, -j), min(bounds.shape[2], blocks.shape[1] - j)):
-                    bounds[t, a, b] += blocks[i + a, j + b]
-        for a in range(bounds.shape[1]):
-            for b in range(bounds.shape[2]):
+        for a in range(A):
+            for b in range(B):
                 u, v = (a - half[0]) * BLOCK, (b - half[1]) * BLOCK
-                bounds[t, a, b] -= _least_penalty(u, v, turns[t], window.sigma)
+                bounds[t, a, b] = sums[t, a, b] - _least_penalty(u, v, turns[t], window.sigma)
     return bounds
 
 
