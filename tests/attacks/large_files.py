@@ -51,6 +51,7 @@ FLASER = b"FLASER 1 1 0 0 0 0 0 0 1 h 1\n"
 GMAPPING = b"LASER_READING 1 1 0 0 0 1\n"
 LEGO = b"S 1 101" + 101 * b" 9" + b"\n"
 SLAMBOT = b"1 1 1" + 360 * b" 9" + b"\n"
+CORESLAM = b"1 1 1 1" + 21 * b" 0" + b" " + 682 * b" 99" + b"\n"
 
 
 @cache
@@ -187,6 +188,7 @@ FILES: dict[str, Callable[[int], Iterator[bytes]]] = {
     "lego_encoders.txt": repeated(LEGO, b"M 1 1 0 0 0 1\n"),
     "lego_reference.txt": repeated(LEGO, b"P 1 1 1\n"),
     "slambot.log": repeated(b"", SLAMBOT),
+    "coreslam.dat": repeated(b"", CORESLAM),
     "table.csv": repeated(b"t,r0,r1,r2\n", b"1,1,1,1\n"),
     "points.json": repeated(b'{"a": [[1,2],', b"[1,2],", b"[1,2]]}"),
     "many_sets.json": counted(b'{"a": [[1,2]]', ',"{0}":[[1,2]]'),

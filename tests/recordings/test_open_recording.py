@@ -16,6 +16,7 @@ from lidarcore.recordings import FORMATS, open_recording
 from lidarcore.scan import Scan
 
 RECORDINGS = {
+    "breezyslam_mines_urg/exp2.dat.gz": "CoreSLAM log",
     "brenner_lego_arena_groundtruth/robot4_scan.txt": "LEGO robot log",
     "ccny_hokuyo_rosbag1/demo.bag": "ROS 1 bag",
     "rplidar_rosbag1/lidar.bag": "ROS 1 bag",

@@ -1,0 +1,58 @@
+"""What laser logs share that hold, beside each scan, the counts of a robot's two encoders."""
+
+from array import array
+from typing import ClassVar
+
+import numpy as np
+
+from lidarcore.arrays import Array
+from lidarcore.geometry import PoseTrack
+from lidarcore.recordings.encoders import dead_reckoning, unwrapped
+from lidarcore.recordings.laser_log import LaserLog, Reading
+from lidarcore.recordings.laser_survey import Survey
+
+_FASTEST = 10.0  # m/s, above which a side's encoder has jumped
+
+
+class TickLog(LaserLog):
+    """T_odom_sensor is dead reckoning from the encoders. Over a jump, as when they are reset, the robot stands."""
+
+    tick: ClassVar[float]
+    """m that a side of the robot moves in a tick of its encoder."""
+    track_width: ClassVar[float]
+    """m between the sides."""
+    ahead: ClassVar[float]
+    """m from the turning centre to the lidar."""
+    bits: ClassVar[int] = 32
+    """Of a counter, after which it wraps."""
+
+    def _open(self, topic: str | None) -> None:
+        self._counters = array("d")
+        self._track: PoseTrack | None = None
+        super()._open(topic)
+
+    def _count_ticks(self, left: float, right: float) -> None:
+        """Take up the counters of a line while the log is read for the first time."""
+        if self._track is None:
+            self._counters.extend((left, right))
+
+    def _learn(self, survey: Survey) -> None:
+        super()._learn(survey)
+        self.T_base_sensor = np.array([self.ahead, 0.0, 0.0])
+        ticks = self._without_jumps(np.frombuffer(self._counters).reshape(-1, 2))
+        self._track = PoseTrack(self._stamps, dead_reckoning(ticks, self.tick, self.track_width))
+
+    def _without_jumps(self, ticks: Array) -> Array:
+        """Ticks (N, 2) that never wrap, with steps of none where a side would have been too fast.
+
+        Stamps of lines that were held up are too close together: none of them tells of a speed that is too high.
+        """
+        steps, took = np.diff(unwrapped(ticks, self.bits), axis=0), np.diff(self._stamps)
+        took = np.maximum(took, np.median(took)) if len(took) else took
+        jumped = np.abs(steps).max(axis=1) * self.tick > _FASTEST * took
+        if jumped.any():
+            self._remark(f"The encoders jumped {jumped.sum()} times: the robot is taken to stand meanwhile.")
+        return np.cumsum(np.concatenate([ticks[:1], np.where(jumped[:, None], 0, steps)]), axis=0)
+
+    def _base_pose(self, reading: Reading, stamp: float) -> Array | None:
+        return self._track.at(stamp) if self._track else None
