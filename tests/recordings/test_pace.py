@@ -38,6 +38,15 @@ def test_poses_that_jump_or_are_not_there_hardly_count():
     assert period(poses) == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf, 1e308])
+def test_poses_that_are_no_places_are_no_error(odd):
+    poses = np.zeros((20, 3))
+    poses[1::2] = odd
+    assert NOMINAL_PERIOD <= period(poses) <= 2.0
+    assert period(np.full((3, 3), odd)) >= NOMINAL_PERIOD
+
+
 @pytest.mark.real_data
 def test_a_real_log_without_times_or_odometry_tells_of_no_robot_of_five_metres_a_second(data):
     """Taken to come ten times a second, 30 of its first 150 scans lay nowhere, and 43 % of the poses told at once were
