@@ -11,7 +11,7 @@ from lidarcore.recordings.encoders import dead_reckoning, unwrapped
 from lidarcore.recordings.laser_log import LaserLog, Reading
 from lidarcore.recordings.laser_survey import Survey
 
-_FASTEST = 10.0  # m/s, above which a side's encoder has jumped
+_FASTEST = 10.0  # m/s, above which a side's encoder has jumped: some robots drive at 3
 
 
 class TickLog(LaserLog):
@@ -51,7 +51,8 @@ class TickLog(LaserLog):
         took = np.maximum(took, np.median(took)) if len(took) else took
         jumped = np.abs(steps).max(axis=1) * self.tick > _FASTEST * took
         if jumped.any():
-            self._remark(f"The encoders jumped {jumped.sum()} times: the robot is taken to stand meanwhile.")
+            often = "1 time" if jumped.sum() == 1 else f"{jumped.sum()} times"
+            self._remark(f"The encoders jumped {often}: the robot is taken to stand meanwhile.")
         return np.cumsum(np.concatenate([ticks[:1], np.where(jumped[:, None], 0, steps)]), axis=0)
 
     def _base_pose(self, reading: Reading, stamp: float) -> Array | None:

@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tick_logs import scans_of, way
 
-from lidarcore import Scan, open_recording
-from lidarcore.geometry import compose, inverse, relative
+from lidarcore import open_recording
+from lidarcore.geometry import relative
 from lidarcore.mapping import Mapper
-from lidarcore.scan import Array
 
 TICK = 2 * np.pi * 0.077 / 2000
+AHEAD = 0.145  # m, of the lidar
 MINES = "breezyslam_mines_urg/exp2.dat.gz"
 
 
@@ -19,17 +20,6 @@ def line(seconds: float, left: int, right: int, ranges: dict[int, int] | None = 
     row = [(ranges or {}).get(k, 0) for k in range(682)]
     before = [int(1e6 * seconds), 14554, left, right, "1.38785", 0, 0, "167.2", *17 * [0]]
     return f"{' '.join(map(str, before))}  {' '.join(map(str, row))}\n"
-
-
-def scans_of(path: Path, *rows: str) -> list[Scan]:
-    path.write_text("".join(rows))
-    return list(open_recording(path))
-
-
-def way(scans: list[Scan]) -> Array:
-    """(3,) of the turning centre, 145 mm behind the lidar, from the first scan to the last."""
-    poses = np.array([scan.odometry for scan in (scans[0], scans[-1])])
-    return relative(*compose(poses, inverse(np.array([0.145, 0.0, 0.0]))))
 
 
 def test_beams_run_from_the_right_to_the_left_in_the_steps_of_the_sensor(tmp_path: Path) -> None:
@@ -43,16 +33,16 @@ def test_beams_run_from_the_right_to_the_left_in_the_steps_of_the_sensor(tmp_pat
 
 
 def test_encoders_tell_the_way(tmp_path: Path) -> None:
-    ahead = way(scans_of(tmp_path / "a.dat", line(0, 500, 700), line(1, 1500, 1700)))
+    ahead = way(scans_of(tmp_path / "a.dat", line(0, 500, 700), line(1, 1500, 1700)), AHEAD)
     np.testing.assert_allclose(ahead, [1000 * TICK, 0, 0], atol=1e-9)
-    turned = way(scans_of(tmp_path / "b.dat", line(0, 0, 0), line(1, -200, 200)))
+    turned = way(scans_of(tmp_path / "b.dat", line(0, 0, 0), line(1, -200, 200)), AHEAD)
     np.testing.assert_allclose(turned, [0, 0, 400 * TICK / 0.33], atol=1e-9)
 
 
 def test_over_a_reset_of_the_encoders_the_robot_stands(tmp_path: Path) -> None:
     path = tmp_path / "a.dat"
     rows = [line(0, 300000, 290000), line(1, 300100, 290100), line(2, 0, 0), line(3, 100, 100)]
-    np.testing.assert_allclose(way(scans_of(path, *rows)), [200 * TICK, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(way(scans_of(path, *rows), AHEAD), [200 * TICK, 0, 0], atol=1e-9)
     assert any("jumped 1 time" in note for note in open_recording(path).notes)
 
 
@@ -61,15 +51,13 @@ def test_a_line_that_was_held_up_is_no_jump(tmp_path: Path) -> None:
         line(seconds, ticks, ticks)
         for seconds, ticks in ((0, 0), (0.199, 200), (0.2, 400), (0.3, 600), (0.4, 800))
     ]
-    np.testing.assert_allclose(way(scans_of(tmp_path / "a.dat", *rows)), [800 * TICK, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(way(scans_of(tmp_path / "a.dat", *rows), AHEAD), [800 * TICK, 0, 0], atol=1e-9)
 
 
 def test_a_line_that_is_cut_is_left_out_and_counted(tmp_path: Path) -> None:
     path = tmp_path / "a.dat"
-    assert [s.stamp for s in scans_of(path, line(0, 0, 0), line(1, 0, 0)[:900] + "\n", line(2, 0, 0))] == [
-        0,
-        2,
-    ]
+    scans = scans_of(path, line(0, 0, 0), line(1, 0, 0)[:900] + "\n", line(2, 0, 0))
+    assert [scan.stamp for scan in scans] == [0, 2]
     recording = open_recording(path)
     list(recording)
     assert "1 damaged line left out." in recording.notes

@@ -119,9 +119,7 @@ def _search(
 ) -> tuple[float, float, float, float]:
     """Largest score above `least`, and its shift, in cells, and turn, not close to one of others (E, 3); else `least`.
 
-    Looks into blocks in the order given.
-
-    Blocks that were looked into are known better than by their bounds afterwards.
+    Looks into blocks in the order given, which are known better than by their bounds afterwards.
     """
     turns, half, scores = window.turns, window.half, np.empty((BLOCK, BLOCK), np.float32)
     flat, limits = bounds.ravel(), known.ravel()

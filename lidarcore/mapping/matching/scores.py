@@ -109,7 +109,7 @@ def _add_runs(scores: Singles, at: Unsigned, n: int, offset: int, sums: Singles,
     """Adds to a run of sums, from the first on, those runs of scores that begin at n places, so far behind them.
 
     A run is as long as a block. Its sums are variables of their own, and places have no sign: so they stay in registers
-    and are added several at a time, which takes a quarter of the time.
+    and are added several at a time, which bounds blocks in a quarter of the time.
     """
     o, ahead = np.uint64(first), np.uint64(offset)
     i1, i2, i3, i4 = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
