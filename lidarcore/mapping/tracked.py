@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import UncertainPose
+from lidarcore.mapping.matching.odometry_calibration import Taken
 from lidarcore.mapping.matching.patches import Patches
 from lidarcore.scan import Scan
 
@@ -17,7 +18,7 @@ class Tracked:
     node      number of the keyframe that the scan hangs on; its own if it is one
     tie       T_node_scan (3,) with its covariance (3, 3), of the keyframe before if the scan is one itself
     moved     T_node_scan as far as motion alone tells: odometry, or the going on of the motion
-    wheels    (3,) errors of odometry that `moved` is without, see OdometryCalibration; None without odometry
+    wheels    what was taken out of odometry in `moved`; None without odometry
     on        False if it lies on nothing known: only odometry or the last motion says where it is
     scan      as a sensor would see it that stood still at its stamp
     patches   of the scan
@@ -35,7 +36,7 @@ class Tracked:
     node: int
     tie: UncertainPose
     moved: UncertainPose
-    wheels: Array | None
+    wheels: Taken | None
     on: bool
     scan: Scan
     patches: Patches

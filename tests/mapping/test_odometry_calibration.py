@@ -12,6 +12,7 @@ from lidarcore.mapping.matching.odometry_calibration import OdometryCalibration
 from lidarcore.simulation import World
 from lidarcore.simulation.rooms import rectangular_room
 
+STILL = np.zeros((2, 3))  # velocities where a motion begins and ends
 SCALE, BIAS = 1.03, 0.01  # of the wheels, and rad that they turn unnoticed in a metre
 
 
@@ -27,11 +28,13 @@ def test_errors_are_learned_as_well_as_noise_lets_it():
         true = np.array([rng.uniform(0.3, 1.0), 0.0, rng.normal(0, 0.2)])
         P = WHEELS.covariance(true)
         odometry = told(true) + rng.multivariate_normal(np.zeros(3), P)
-        wheels.learn(UncertainPose(wheels.corrected(odometry), P + exact), UncertainPose(true, exact))
+        wheels.learn(
+            UncertainPose(wheels.corrected(odometry, *STILL), P + exact), UncertainPose(true, exact), *STILL
+        )
     ahead = np.array([1.0, 0.0, 0.0])
     # 1600 steps of some 0.65 m: what one metre tells is unsure by the noise of one over the square root of all.
     sigma = np.sqrt(np.diag(WHEELS.covariance(ahead)) / 1040)
-    off = wheels.corrected(told(ahead)) - ahead
+    off = wheels.corrected(told(ahead), *STILL) - ahead
     assert abs(off[0]) < SURE * sigma[0] < 0.03
     assert abs(off[2]) < SURE * sigma[2]
 
@@ -40,15 +43,15 @@ def test_a_corridor_that_tells_nothing_teaches_nothing():
     wheels, P = OdometryCalibration(), np.diag([0.1, 0.1, 0.1]) ** 2
     for _ in range(100):
         moved = UncertainPose(np.array([1.0, 0.0, 0.0]), P)
-        wheels.learn(moved, moved)
-    np.testing.assert_array_equal(wheels.corrected(np.array([1.0, 0.2, 0.1])), [1.0, 0.2, 0.1])
+        wheels.learn(moved, moved, *STILL)
+    np.testing.assert_array_equal(wheels.corrected(np.array([1.0, 0.2, 0.1]), *STILL), [1.0, 0.2, 0.1])
 
 
 def test_wheels_that_slip_teach_nothing():
     wheels, P = OdometryCalibration(), np.diag([0.1, 0.1, 0.1]) ** 2
     stuck = UncertainPose(np.zeros(3), np.diag([0.01, 0.01, 0.01]) ** 2)
-    wheels.learn(UncertainPose(np.array([1.0, 0.0, 0.0]), P), stuck)
-    np.testing.assert_array_equal(wheels.corrected(np.array([1.0, 0.0, 0.0])), [1.0, 0.0, 0.0])
+    wheels.learn(UncertainPose(np.array([1.0, 0.0, 0.0]), P), stuck, *STILL)
+    np.testing.assert_array_equal(wheels.corrected(np.array([1.0, 0.0, 0.0]), *STILL), [1.0, 0.0, 0.0])
 
 
 def corridor():

@@ -34,6 +34,8 @@ def share_held(scans: Sequence[Scan]) -> float:
 
 
 def test_poses_are_what_they_claim_only_if_its_beams_were_taken_clockwise(scans):
-    assert share_held(scans) > 0.95
+    """With beams in the wrong order, .27 to .72 hold from one start or another, by chance: so three are taken."""
     as_listed = [replace(scan, beam_times=scan.beam_times[::-1]) for scan in scans]
-    assert share_held(as_listed) < 0.6
+    begins = (0, 3, 6)
+    assert min(share_held(scans[begin:]) for begin in begins) > 0.95
+    assert np.mean([share_held(as_listed[begin:]) for begin in begins]) < 0.6

@@ -11,18 +11,18 @@ from lidarcore.mapping.doubt import DOUBTFUL, trust
 from lidarcore.mapping.graph.equations import Step
 from lidarcore.mapping.graph.known import Known
 from lidarcore.mapping.graph.pose_graph import PoseGraph
-from lidarcore.mapping.matching.odometry_calibration import effects
+from lidarcore.mapping.matching.odometry_calibration import Taken
 from lidarcore.mapping.tracked import Tracked
 
 
 class _Driven(NamedTuple):
     """How a keyframe's edge hangs on odometry.
 
-    taken  (3,) errors of odometry that were taken out
+    taken  errors of odometry that were taken out, and their effects
     share  (3, 3) of the motion by odometry that is in the edge: nearly none where scans tell it
     """
 
-    taken: Array
+    taken: Taken
     share: Array
 
 
@@ -51,13 +51,13 @@ class Steps:
             self._driven[len(self._edges) - 1] = _Driven(tracked.wheels, _share(tracked))
 
     def recalibrate(self, errors: Array) -> bool:
-        """Take out what odometry does wrong (3,) at each, known less well on the way; whether there is any."""
+        """Take out what odometry does wrong (4,) at each, known less well on the way; whether there is any."""
         for number, driven in self._driven.items():
             step = self._by_motion[number]
-            change = effects(step.pose) @ (errors - driven.taken)
+            change = driven.taken.effects @ (errors - driven.taken.errors)
             self._by_motion[number] = replace(step, pose=step.pose + change)
             self._graph.amend(self._edges[number], driven.share @ change)
-            self._driven[number] = driven._replace(taken=errors)
+            self._driven[number] = driven._replace(taken=driven.taken._replace(errors=errors))
         return bool(self._driven)
 
     def besides(self, known: Known) -> list[Step]:

@@ -43,7 +43,7 @@ class FrontEnd:
 
     @property
     def wheels(self) -> Array:
-        """(3,) what odometry does wrong at every step, as far as it is known now."""
+        """(4,) what odometry does wrong at every step, as far as it is known now."""
         return self._prediction.wheels
 
     def take_noise(self, noise: SensorNoise) -> None:
@@ -77,7 +77,7 @@ class FrontEnd:
         tie = UncertainPose(tie.pose, tie.covariance + self._prediction.astray)
         leaves = island or (sees and self._leaves(tie[0], registered.inliers))
         is_view = on and not leaves and self._standing.is_due(scan.stamp, tie.pose)
-        taken = None if wheels is None else self.wheels
+        taken = None if wheels is None else self._prediction.taken(tie.pose)
         tracked = Tracked(
             self._scans, scan.stamp, self._number - 1, tie, moved, taken, on, scan, seen, self._sweep.covariance,
             self._sweep.removed, leaves, is_view, island, first,
