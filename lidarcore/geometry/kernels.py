@@ -42,16 +42,24 @@ def compose_with_covariance(T_a_b: Array, own: Array, T_b_c: Array, other: Array
     return pose, _carried(F, own, F) + _carried(G, other, G)
 
 
+@inlined
+def turned_back(heading: float) -> Array:
+    """(3, 3) that takes errors of a pose to the frame of a sensor with this heading: both Jacobians of `relative` at
+    the sensor's own pose, but for the sign."""
+    c, s = np.cos(heading), np.sin(heading)
+    B = np.eye(3)
+    B[0, 0], B[0, 1], B[1, 0], B[1, 1] = c, s, -s, c
+    return B
+
+
 @kernel
 def relative_with_covariance(
     T_a_b: Array, T_a_c: Array, own: Array, mixed: Array, other: Array
 ) -> tuple[Array, Array]:
     """T_b_c (3,) and its covariance, of poses (3,) with covariances own and other (3, 3), and mixed between them."""
-    c, s = np.cos(T_a_b[2]), np.sin(T_a_b[2])
-    x, y = unrotate(c, s, T_a_c[0] - T_a_b[0], T_a_c[1] - T_a_b[1])
-    A, B = -np.eye(3), np.eye(3)
-    B[0, 0], B[0, 1], B[1, 0], B[1, 1] = c, s, -s, c
-    A[0, 0], A[0, 1], A[1, 0], A[1, 1] = -c, -s, s, -c
+    B = turned_back(T_a_b[2])
+    x, y = unrotate(B[0, 0], B[0, 1], T_a_c[0] - T_a_b[0], T_a_c[1] - T_a_b[1])
+    A = -B
     A[0, 2], A[1, 2] = y, -x
     shared = _carried(A, mixed, B)
     P = _carried(A, own, A) + shared + shared.T + _carried(B, other, B)

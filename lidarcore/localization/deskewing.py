@@ -3,12 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from lidarcore.arrays import Array
-from lidarcore.compiled import kernel
+from lidarcore.compiled import inlined, kernel
 from lidarcore.errors import LocalizationError
-from lidarcore.geometry import rotation
+from lidarcore.geometry import rotate, rotation
 from lidarcore.geometry.kernels import wrap
 from lidarcore.localization.dead_reckoning import Velocity
 from lidarcore.localization.points import Points
@@ -56,9 +55,8 @@ def deskew(scan: Scan, v: float, w: float, u: float = 0.0, acceleration: Velocit
 def skew(points: Points, times: Array, v: float, w: float, u: float) -> Points:
     """Points (K,) of a deskewed scan as the sensor saw them at times (K,) s after the stamp, from where it was then."""
     moved, turned = _arcs(times, v, w, u)
-    seen = (points.xy @ [1, 1j] - moved) * np.exp(-1j * turned)
     R = rotation(-turned)
-    return points.with_new(np.stack([seen.real, seen.imag], -1), R @ points.covariance @ R.transpose(0, 2, 1))
+    return points.with_new(rotate(-turned, points.xy - moved), R @ points.covariance @ R.transpose(0, 2, 1))
 
 
 @kernel
@@ -66,17 +64,35 @@ def _carried(
     ranges: Array, bearings: Array, times: Array, speeds: Velocity, growth: Velocity
 ) -> tuple[Array, Array]:
     """Ranges and bearings (N,) of beams measured at times (N,) s on the way, as seen from its beginning."""
-    (v, w, u), (dv, dw, du) = speeds, growth
-    moved, turned = _arcs(times, v, w, u)
-    bend = times * (times / 2 - np.mean(times))
-    moved, turned = moved + (dv + 1j * du) * bend, turned + dw * bend
-    points = moved + ranges * np.exp(1j * (bearings + turned))
-    return np.abs(points), np.where(np.isnan(ranges), wrap(bearings + turned), np.angle(points))
+    (v, w, u), (dv, dw, du), mean = speeds, growth, np.mean(times)
+    carried, seen_at = np.empty_like(ranges), np.empty_like(bearings)
+    for k in range(len(times)):
+        x, y, turned = _arc(times[k], v, w, u)
+        bend = times[k] * (times[k] / 2 - mean)
+        bearing = bearings[k] + turned + dw * bend
+        if np.isnan(ranges[k]):
+            carried[k], seen_at[k] = np.nan, wrap(bearing)
+            continue
+        x += dv * bend + ranges[k] * np.cos(bearing)
+        y += du * bend + ranges[k] * np.sin(bearing)
+        carried[k], seen_at[k] = np.hypot(x, y), np.arctan2(y, x)
+    return carried, seen_at
 
 
 @kernel
-def _arcs(times: Array, v: float, w: float, u: float) -> tuple[NDArray[np.complex128], Array]:
-    """Where the sensor has moved after times (K,) s, as x + iy m, and the angle it has turned, rad."""
-    turned = w * times
+def _arcs(times: Array, v: float, w: float, u: float) -> tuple[Array, Array]:
+    """Where the sensor has moved after times (K,) s, (K, 2) m, and the angle it has turned, rad."""
+    moved, turned = np.empty((len(times), 2)), np.empty_like(times)
+    for k in range(len(times)):
+        moved[k, 0], moved[k, 1], turned[k] = _arc(times[k], v, w, u)
+    return moved, turned
+
+
+@inlined
+def _arc(t: float, v: float, w: float, u: float) -> tuple[float, float, float]:
+    """Where it has moved after t s, x and y in m, and the angle it has turned, rad."""
+    half = w * t / 2
+    c, s = np.cos(half), np.sin(half)
     # The chord of the arc of angle a is sin(a / 2) / (a / 2) long and points half-way round the turn.
-    return (v + 1j * u) * times * np.sinc(turned / (2 * np.pi)) * np.exp(0.5j * turned), turned
+    chord = t * (s / half if half != 0 else 1.0)
+    return chord * (c * v - s * u), chord * (s * v + c * u), w * t

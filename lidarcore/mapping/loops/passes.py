@@ -107,6 +107,8 @@ class Passes:
 
     def _kept(self, nodes: Ints) -> Ints:
         """Those of the nodes whose scans are still there."""
+        if len(self._keyframes) == len(self._graph.poses):
+            return nodes
         return np.array([node for node in nodes.tolist() if node in self._keyframes], np.int64)
 
 

@@ -111,7 +111,7 @@ class FrontEnd:
             corrected = self._sweep.correct(scan, self._known.pose, self._map.tie(registered).pose, dt)
             if corrected is not scan:
                 scan, seen = corrected, patches(corrected, self._settings.match)
-                registered = self._map.registered_from(registered.pose, seen, expected)
+                registered = self._map.registered_from(registered.pose, seen, expected, settled=True)
         return scan, seen, registered
 
     def _judged(

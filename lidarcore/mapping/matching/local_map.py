@@ -64,23 +64,26 @@ class LocalMap:
         What a search finds far from the guess must be told by something that was seen against the guess: where a sensor
         comes to what it has not seen yet, a corridor fits best where it has been seen.
         """
-        near = seen.near_means
         registered = at_guess = self.registered_from(expected.pose, seen, expected)
         if is_blind(seen):
             return registered
-        if registered.inliers < SURE or (expected.leaves_open(near) and registered.inliers + _BETTER < 1):
+        if registered.inliers < SURE or (
+            registered.inliers + _BETTER < 1 and expected.leaves_open(seen.near_means)
+        ):
             registered = self._searched(seen, expected, expected.sigma, registered)
         if registered.inliers < SURE:
             registered = self._searched(seen, expected, _FURTHER * expected.sigma, registered)
         is_far = _apart(registered.pose, expected.pose) and expected.contradiction(registered.pose) > DOUBTFUL
-        if is_far and not self._refutes(scan, at_guess.pose, registered.pose, len(near)):
+        if is_far and not self._refutes(scan, at_guess.pose, registered.pose, seen.near_count):
             return at_guess
         return registered
 
-    def registered_from(self, start: Array, seen: Patches, expected: Expectation) -> Registration:
-        """The scan on the local map, from a pose (3,) in its frame that is near the right one."""
+    def registered_from(
+        self, start: Array, seen: Patches, expected: Expectation, settled: bool = False
+    ) -> Registration:
+        """The scan on the local map, from a pose (3,) in its frame that is near the right one, or nearly right."""
         reach = self._settings.match.reach
-        return register(self._surfels, seen, start, expected.pose, expected.information, reach)
+        return register(self._surfels, seen, start, expected.pose, expected.information, reach, settled)
 
     def _searched(
         self, seen: Patches, expected: Expectation, sigma: Array, registered: Registration
@@ -96,11 +99,11 @@ class LocalMap:
         self, scan: Scan, seen: Patches, expected: Expectation, registered: Registration
     ) -> Array | None:
         """Another pose (3,) at which a scan fits nearly as well, if the guess and what was seen leave it open."""
-        if registered.inliers < self._settings.inliers:
+        if registered.inliers < self._settings.inliers or is_blind(seen):
+            return None
+        if 3 * np.hypot(*expected.sigma[:2]) < _APART:
             return None
         reference, near = self._surfels.means[self._surfels.near], seen.near_means
-        if is_blind(seen) or 3 * np.hypot(*expected.sigma[:2]) < _APART:
-            return None
         match, besides = self._settings.match, registered.pose[None]
         least = _ROUGHLY * registered.inliers
         others = candidates(reference, near, expected.pose, expected.sigma, match, besides, least)
@@ -126,15 +129,15 @@ class LocalMap:
         as far as the guess leaves its heading open, it comes to lie elsewhere. What lies farther apart is another
         place: a corridor looks the same both ways.
         """
-        near, spread, total = seen.near_means, np.zeros((3, 3)), 1.0
-        if is_blind(seen) or not expected.leaves_open(near) or registered.inliers + _BETTER >= 1:
+        spread, total = np.zeros((3, 3)), 1.0
+        if is_blind(seen) or registered.inliers + _BETTER >= 1 or not expected.leaves_open(seen.near_means):
             return spread
         turned = min(expected.sigma[2], _TURNED)
         for turn in (-turned, turned):
             other = self.registered_from(registered.pose + np.array([0.0, 0.0, turn]), seen, expected)
             off = pose_difference(other.pose, registered.pose)
             if off @ registered.information @ off > 1:
-                likelihood = expected.likelihood(other, registered, len(near))
+                likelihood = expected.likelihood(other, registered, seen.near_count)
                 spread += likelihood * np.outer(off, off)
                 total += likelihood
         return spread / total
@@ -143,7 +146,7 @@ class LocalMap:
         """Whether a scan that contradicts the guess fits no better than that costs: some of it fits anywhere."""
         if expected.contradiction(registered.pose) <= DOUBTFUL:
             return False
-        return evidence(registered.inliers, len(seen.near_means)) < expected.cost(registered.pose) / 2
+        return evidence(registered.inliers, seen.near_count) < expected.cost(registered.pose) / 2
 
     def _refutes(self, scan: Scan, pose: Array, other: Array, count: int) -> bool:
         """Whether more of a scan contradicts a pose (3,) than another one, by more than two standard deviations.
@@ -172,7 +175,7 @@ class LocalMap:
 
 def is_blind(seen: Patches) -> bool:
     """Whether a scan has so few patches that it fits anywhere."""
-    return len(seen.near_means) < _BLIND
+    return seen.near_count < _BLIND
 
 
 def _apart(a: Array, b: Array) -> bool:

@@ -55,6 +55,11 @@ class Patches(NamedTuple):
         return Patches(*(column[self.counts > 0] for column in self))
 
     @property
+    def near_count(self) -> int:
+        """K, how many these are."""
+        return int(np.count_nonzero(self.counts))
+
+    @property
     def near_means(self) -> Array:
         """(K, 2) m of these alone."""
         return self.means[self.counts > 0]

@@ -1,13 +1,27 @@
 """How a sensor without odometry is taken to go on: as it went before; and how far that may lead astray."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
-from lidarcore.geometry import UncertainPose, compose_jacobians, relative, relative_jacobians
+from lidarcore.geometry import UncertainPose, relative
+from lidarcore.geometry.kernels import compose_with_jacobians, turned_back
 
 _NOTHING = np.zeros((3, 3))
-_ALL = np.eye(3)
+
+
+class _Told(NamedTuple):
+    """What a match tells: where a scan was found (3,), where the one before it had been known to be, the covariances
+    (3, 3) of both and of the guess, and that of how a step may differ from the one before."""
+
+    known: Array
+    known_covariance: Array
+    guess_covariance: Array
+    found: Array
+    found_covariance: Array
+    change: Array
 
 
 class Persistence:
@@ -45,20 +59,31 @@ class Persistence:
 
         change (3, 3) of the step, by which speeds may have changed since the one before.
         """
-        by_pose, by_step = compose_jacobians(known.pose, self.step)
-        to_sensor = relative_jacobians(found.pose, found.pose)[1]
-        untold = _untold(guess.covariance, found.covariance)
-        told = _within(_ALL - untold, found.covariance + known.covariance)
-        self.astray = _within(untold @ by_pose, self.astray) + _within(untold @ by_step, self.longer)
-        gone_on = to_sensor @ untold @ by_step
-        self._shared = _within(gone_on, self._shared + self._covariance + change)
-        self._covariance = _within(gone_on, self._covariance + change) + _within(to_sensor, told)
+        told = _Told(known.pose, known.covariance, guess.covariance, found.pose, found.covariance, change)
+        self.astray, self._shared, self._covariance = _went_on(
+            self.step, self.astray, self._shared, self._covariance, told
+        )
         self.step = relative(known.pose, found.pose)
 
     def stop(self) -> None:
         """Nothing tells that it goes on: it may as well have stopped."""
         self._covariance = self._covariance + np.outer(self.step, self.step)
         self.step = np.zeros(3)
+
+
+@kernel
+def _went_on(
+    step: Array, astray: Array, shared: Array, covariance: Array, told: _Told
+) -> tuple[Array, Array, Array]:
+    """What is unsure after a step (3,): of the pose, of the next step for what it shares with that, and by itself."""
+    _, by_pose, by_step = compose_with_jacobians(told.known, step)
+    to_sensor = turned_back(told.found[2])
+    untold = _untold(told.guess_covariance, told.found_covariance)
+    seen = _within(np.eye(3) - untold, told.found_covariance + told.known_covariance)
+    astray = _within(untold @ by_pose, astray) + _within(untold @ by_step, covariance + 2 * shared)
+    gone_on = to_sensor @ untold @ by_step
+    shared = _within(gone_on, shared + covariance + told.change)
+    return astray, shared, _within(gone_on, covariance + told.change) + _within(to_sensor, seen)
 
 
 @kernel
@@ -73,7 +98,7 @@ def _untold(guess: Array, found: Array) -> Array:
     return L @ (V * np.clip(stays, 0.0, 1.0)) @ V.T @ back
 
 
+@kernel
 def _within(J: Array, covariance: Array) -> Array:
     """J P J^T."""
-    carried: Array = J @ covariance @ J.T
-    return carried
+    return (J @ covariance @ J.T).astype(np.float64)

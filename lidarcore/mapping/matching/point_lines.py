@@ -1,5 +1,7 @@
 """Each point of a scan on the line of its neighbours, or, on a wall seen at a slant, of the two beams beside it."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from lidarcore.arrays import Array
@@ -16,27 +18,29 @@ _RELIEF = 0.01  # m by which walls are off lines of that length
 _ROUGH = 5.0  # standard deviations of chi-square by which points of a rough surface scatter more than noise makes them
 
 
+class _Sums(NamedTuple):
+    """Of several points as one of them sees them: their number, coordinates, squares and products in m and m²."""
+
+    number: int
+    x: float
+    y: float
+    xx: float
+    xy: float
+    yy: float
+
+
 @kernel
 def fit_lines(points: Array, ranges: Array, reaches: Array, gap: float, noise: Array, single: Array) -> None:
     """Each point as a patch of its own: on the line of its neighbours, which it counts."""
     for i in range(len(points)):
-        first, count = _neighbours(points, i, reaches[i] * reaches[i], max(gap, reaches[i]) ** 2)
-        _fit_line(points, i, first, count, noise, single[i])
+        near = _around(points, i, reaches[i] * reaches[i], max(gap, reaches[i]) ** 2)
+        _fit_line(points[i], near, noise, single[i])
 
 
-@kernel
-def _fit_line(points: Array, i: int, first: int, count: int, noise: Array, row: Array) -> None:
-    """Point i on the line of `count` points from the first on, around the ring."""
-    N, (px, py) = len(points), points[i]
-    x = y = xx = xy = yy = 0.0
-    for j in range(count):
-        k = first + j if first + j < N else first + j - N
-        u, v = points[k, 0] - px, points[k, 1] - py
-        x += u
-        y += v
-        xx += u * u
-        xy += u * v
-        yy += v * v
+@inlined
+def _fit_line(point: Array, sums: _Sums, noise: Array, row: Array) -> None:
+    """A point (2,) on the line of several."""
+    (px, py), (count, x, y, xx, xy, yy) = point, sums
     x, y = x / count, y / count
     xx, xy, yy = xx / count - x * x, xy / count - x * y, yy / count - y * y
     half, root = (xx + yy) / 2, np.sqrt(((xx - yy) / 2) ** 2 + xy * xy)
@@ -84,7 +88,7 @@ def add_slanted(points: Array, bearings: Array, spacing: float, noise: Array, si
         across = ((ux + vx) * points[i, 1] - (uy + vy) * points[i, 0]) / length
         square = points[i, 0] ** 2 + points[i, 1] ** 2
         if off * off < _STRAIGHT * (noise[0] * across * across / square + _RELIEF**2):
-            _fit_line(points, i, i - 1, 3, noise, single[i])
+            _fit_line(points[i], _sum_of(-ux, -uy, vx, vy), noise, single[i])
             single[i, COUNT] = SLANTED
 
 
@@ -123,26 +127,33 @@ def _free(row: Array) -> float:
     return max(max(row[COUNT], LEAST) - 2.0, 1.0)
 
 
-@kernel
-def _neighbours(points: Array, i: int, reach: float, gap: float) -> tuple[int, int]:
-    """First point and number of points of the run around point i, by squared distances; around the ring."""
-    N = len(points)
-    first, count = i, 1
+@inlined
+def _sum_of(ux: float, uy: float, vx: float, vy: float) -> _Sums:
+    """Of a point and two others, seen from it."""
+    return _Sums(3, ux + vx, uy + vy, ux * ux + vx * vx, ux * uy + vx * vy, uy * uy + vy * vy)
+
+
+@inlined
+def _around(points: Array, i: int, reach: float, gap: float) -> _Sums:
+    """Of the run of points around point i, by squared distances; around the ring."""
+    N, (px, py) = len(points), points[i]
+    count, x, y, xx, xy, yy = 1, 0.0, 0.0, 0.0, 0.0, 0.0
     for way in (-1, 1):
-        k, x, y = i, points[i, 0], points[i, 1]
+        k, before_u, before_v = i, 0.0, 0.0
         while count < N:
             k += way
             if k < 0:
                 k = N - 1
             elif k == N:
                 k = 0
-            u, v = points[k, 0], points[k, 1]
-            if (u - x) ** 2 + (v - y) ** 2 > gap:
+            u, v = points[k, 0] - px, points[k, 1] - py
+            if (u - before_u) ** 2 + (v - before_v) ** 2 > gap or u * u + v * v > reach:
                 break
-            if (u - points[i, 0]) ** 2 + (v - points[i, 1]) ** 2 > reach:
-                break
-            x, y = u, v
+            before_u, before_v = u, v
             count += 1
-            if way < 0:
-                first = k
-    return first, count
+            x += u
+            y += v
+            xx += u * u
+            xy += u * v
+            yy += v * v
+    return _Sums(count, x, y, xx, xy, yy)

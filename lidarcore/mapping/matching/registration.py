@@ -37,24 +37,27 @@ def information_of(covariance: Array) -> Array:
 
 
 def register(
-    map: Surfels, scan: Patches, start: Array, guess: Array, prior: Array, reach: float
+    map: Surfels, scan: Patches, start: Array, guess: Array, prior: Array, reach: float, settled: bool = False
 ) -> Registration:
     """Gauss-Newton from a start (3,); the guess (3,) takes part with its information prior (3, 3).
 
+    Surfaces are looked for within `reach` m at first, then nearer; only there if the start is where the scan lay
+    already, but for what has been mended of it since.
     Where the match disagrees with the guess by more than chance allows (wheels that slip), the guess counts less;
     where the surfaces say nothing (along a corridor), it counts fully.
     """
     x, H = np.array(start), np.empty((3, 3))
-    inliers = _register(map, scan, x, guess, prior, reach, H)
+    least = _LEAST * reach
+    inliers = _register(map, scan, x, guess, prior, least if settled else reach, least, H)
     x[2] = wrap(x[2])
     return Registration(x, H, inliers)
 
 
 @kernel
 def _register(
-    map: Surfels, scan: Patches, x: Array, guess: Array, prior: Array, reach: float, H: Array
+    map: Surfels, scan: Patches, x: Array, guess: Array, prior: Array, reach: float, least: float, H: Array
 ) -> float:
-    g, B, least, share = np.empty(3), np.empty((3, 3)), _LEAST * reach, 0.0
+    g, B, share = np.empty(3), np.empty((3, 3)), 0.0
     for _ in range(_ROUNDS):
         share = linearised(map, scan, x, reach, H, B, g)
         _without_pretence(H, B, g)

@@ -4,12 +4,13 @@ A revolution takes a tenth of a second. Wheels tell a turn in it to some hundred
 matched to a map far better: so a scan is matched twice, the second time without the motion that the first one found.
 """
 
+from math import sin
 from typing import NamedTuple
 
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.geometry import compose, relative, rotate
+from lidarcore.geometry import compose, relative, rotate_one
 from lidarcore.localization.deskewing import deskew
 from lidarcore.scan import Scan
 
@@ -114,13 +115,20 @@ def _smaller(a: Array, b: Array) -> Array:
 def arc_end(covered: Array) -> Array:
     """Pose (3,) where an arc ends, of which so much (3,) is covered: m along and across it, rad."""
     x, y, turn = covered.tolist()
-    return np.append(np.sinc(turn / (2 * np.pi)) * rotate(turn / 2, np.array([x, y])), turn)
+    chord = _chord(turn)
+    return np.array([*rotate_one(turn / 2, chord * x, chord * y), turn])
 
 
 def along_arc(end: Array) -> Array:
     """What (3,) of an arc is covered where it ends at a pose (3,): the inverse of `arc_end`."""
     x, y, turn = end.tolist()
-    return np.append(rotate(-turn / 2, np.array([x, y])) / np.sinc(turn / (2 * np.pi)), turn)
+    chord = _chord(turn)
+    return np.array([*rotate_one(-turn / 2, x / chord, y / chord), turn])
+
+
+def _chord(turn: float) -> float:
+    """Length of the chord beside that of the arc."""
+    return sin(turn / 2) / (turn / 2) if turn else 1.0
 
 
 def elapsed(scan: Scan, before: float) -> float:
