@@ -15,7 +15,8 @@ _BEFORE, _BEAMS = 25, 682  # columns before the ranges, and ranges
 _LEFT, _RIGHT = 2, 3  # columns of the encoders
 _NEAREST = 0.02  # m; below are codes for errors
 _AHEAD = 384 - 44  # step of the sensor, of 1024 in a turn, that looks ahead, from the first one on
-_BEARINGS: Array = np.radians(360 / 1024 * (np.arange(_BEAMS, dtype=np.float64) - _AHEAD))
+_STEPS: Array = np.arange(_BEAMS, dtype=np.float64)
+_BEARINGS: Array = np.radians(360 / 1024 * (_STEPS - _AHEAD))
 
 
 class CoreSlamLog(TickLog):
@@ -24,6 +25,7 @@ class CoreSlamLog(TickLog):
     name, sensor = "CoreSLAM log", "Hokuyo URG-04LX"
     signature = re.compile(rb"\A\d+ \d+ -?\d+ -?\d+( -?[\d.]+){21}  \d+( \d+){100}")
     tick, track_width, ahead = 2 * np.pi * 0.077 / 2000, 2 * 0.165, 0.145
+    turned = _STEPS / 1024
 
     def _parse(self, words: list[bytes]) -> Reading | None:
         if not words:

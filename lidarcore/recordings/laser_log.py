@@ -75,6 +75,9 @@ class LaserLog(Recording):
         """Read a line; None if it is not a laser's. Raises ValueError or IndexError if it is damaged."""
 
     _late = 0  # lines by which one may stand too late in the file
+    _beam_times: Array | None = (
+        None  # (N,) s after its stamp at which each beam of a scan is taken, if that is known
+    )
 
     def _open(self, topic: str | None) -> None:
         surveys: defaultdict[str, Survey] = defaultdict(Survey)
@@ -177,7 +180,7 @@ class LaserLog(Recording):
         ranges = np.where(missing, np.nan, reading.ranges)
         bearings = sick_bearings(len(ranges)) if reading.bearings is None else reading.bearings
         odometry = self._odometry(reading, stamp)
-        return Scan(ranges, bearings, stamp, reading.quality, odometry=odometry, truth=reading.truth)
+        return Scan(ranges, bearings, stamp, reading.quality, self._beam_times, odometry, truth=reading.truth)
 
     def _odometry(self, reading: Reading, stamp: float) -> Array | None:
         """T_odom_sensor (3,) of a reading: as it says, or by where the robot was and the sensor sits on it."""

@@ -12,7 +12,7 @@ from lidarcore.recordings.laser_log import Reading, numbers
 from lidarcore.recordings.laser_survey import Survey
 from lidarcore.recordings.tick_log import TickLog
 
-_DEGREES = 360
+_DEGREES: Array = np.arange(360, dtype=np.float64)  # clockwise, in the order in which they are taken
 
 
 class SlambotLog(TickLog):
@@ -22,6 +22,7 @@ class SlambotLog(TickLog):
     signature = re.compile(rb"\A-?\d+ -?\d+ \d+( \d+){100}")
     tick, track_width = 0.90 * np.pi * 0.0582 * 3 / 1000, 0.190  # tracks slip, a turn has 1000 / 3 ticks
     ahead, bits = -0.035, 16
+    turned = _DEGREES / 360
 
     def _settle_stamps(self, survey: Survey) -> Array:
         """Stamps (N,) s: the counter wraps every 65.5 s and only goes on."""
@@ -32,7 +33,6 @@ class SlambotLog(TickLog):
     def _parse(self, words: list[bytes]) -> Reading | None:
         if not words:
             return None
-        left, right, milliseconds, *ranges = numbers(words, 3 + _DEGREES)
+        left, right, milliseconds, *ranges = numbers(words, 3 + len(_DEGREES))
         self._count_ticks(left, right)
-        bearings = -np.deg2rad(np.arange(_DEGREES, dtype=np.float64))
-        return Reading("scans", np.array(ranges) / 1000, bearings, np.inf, (milliseconds,))
+        return Reading("scans", np.array(ranges) / 1000, -np.deg2rad(_DEGREES), np.inf, (milliseconds,))

@@ -25,6 +25,8 @@ class TickLog(LaserLog):
     """m from the turning centre to the lidar."""
     bits: ClassVar[int] = 32
     """Of a counter, after which it wraps."""
+    turned: ClassVar[Array]
+    """(N,) shares of a revolution that the lidar has made when it takes each beam; it makes one for each line."""
 
     def _open(self, topic: str | None) -> None:
         self._counters = array("d")
@@ -39,6 +41,8 @@ class TickLog(LaserLog):
     def _learn(self, survey: Survey) -> None:
         super()._learn(survey)
         self.T_base_sensor = np.array([self.ahead, 0.0, 0.0])
+        if len(self._stamps) > 1:
+            self._beam_times = self.turned * np.median(np.diff(self._stamps))
         ticks = self._without_jumps(np.frombuffer(self._counters).reshape(-1, 2))
         self._track = PoseTrack(self._stamps, dead_reckoning(ticks, self.tick, self.track_width))
 

@@ -95,6 +95,27 @@ def test_what_was_seen_just_before_is_a_place_too():
     assert np.abs(loop.pose - relative(truth[k - 3], truth[k])).max() < 0.05
 
 
+def test_a_loop_is_as_unsure_as_the_sensors_are_of_where_their_scans_stand():
+    """Drawn: both sensors are off from where their scans stand, by how these moved in a revolution."""
+    truth, graph, keyframes = newest_on_first(FURNISHED, 0.0)
+    i, k, rng = len(truth) - 4, len(truth) - 1, np.random.default_rng(5)
+    sweeps = {i: np.diag([0.03, 0.01, 0.02]) ** 2, k: np.diag([0.01, 0.04, 0.03]) ** 2}
+
+    def loop(of_scans):
+        passes = Passes(graph, of_scans, LOOPS, MATCH)
+        seen = passes.seen(k, np.arange(k - 2, k + 1))
+        hypotheses = Hypotheses(graph, of_scans, passes, LOOPS, MATCH)
+        return hypotheses.at(i, k, np.diag([0.05, 0.05, 0.02]) ** 2, seen)[0]
+
+    still = loop(keyframes)
+    swept = loop(keyframes | {node: keyframes[node]._replace(sweep=sweeps[node]) for node in sweeps})
+    off_i, off_k = (rng.multivariate_normal(np.zeros(3), sweeps[node], 20_000) for node in (i, k))
+    drawn = relative(off_i, compose(still.pose, off_k))
+    np.testing.assert_array_equal(swept.pose, still.pose)
+    grown = swept.covariance - still.covariance
+    np.testing.assert_allclose(grown, np.cov(drawn.T), atol=0.05 * np.diag(np.cov(drawn.T)).max())
+
+
 @pytest.mark.parametrize("off", [-4.9, 4.9])
 def test_doors_that_are_alike_are_rivals_of_each_other(off):
     """Nothing tells one door from the next, so that none may be believed alone; all of them lie a door apart."""

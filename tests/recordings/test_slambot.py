@@ -22,6 +22,15 @@ def test_angles_grow_clockwise_and_zero_is_no_return(tmp_path: Path) -> None:
     np.testing.assert_allclose(scan.xy[scan.valid], [[1, 0], [0, -2]], atol=1e-12)
 
 
+def test_the_lidar_turns_once_from_line_to_line_and_clockwise(tmp_path: Path) -> None:
+    first, last = scans_of(tmp_path / "a.log", *(line(0, 0, 180 * k) for k in range(4)))[::3]
+    for scan in (first, last):
+        assert scan.beam_times is not None
+        np.testing.assert_allclose(
+            scan.beam_times, 0.18 * (-scan.bearings % (2 * np.pi)) / (2 * np.pi), atol=1e-9
+        )
+
+
 def test_equal_ticks_drive_straight_and_a_wrap_is_none(tmp_path: Path) -> None:
     rows = [line(32700, -32700, 0), line(-32736, -32600, 180)]  # both sides 100 on, the left one over the end
     np.testing.assert_allclose(way(scans_of(tmp_path / "a.log", *rows), AHEAD), [100 * TICK, 0, 0], atol=1e-9)

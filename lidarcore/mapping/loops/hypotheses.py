@@ -5,7 +5,7 @@ from itertools import islice
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import UncertainPose, chi_square_gate, compose, relative, wrap
+from lidarcore.geometry import HERE, UncertainPose, chi_square_gate, compose, relative, wrap
 from lidarcore.mapping.graph.known import JointPoses
 from lidarcore.mapping.loops.consistency import Loop, spread, squared
 from lidarcore.mapping.loops.keyframes import Keyframe
@@ -78,8 +78,8 @@ class Hypotheses:
         """Node k, taken to be at a place (3,), registered on what was seen around node i; None if it does not fit."""
         mean, P = self._graph.relative(i, k)
         match, start = self._match, relative(self._graph.poses[i], place)
-        earlier = self._passes.seen(i, self._passes.around(i, k, 0.0))
-        reference = surfels(earlier, match.patch, match.reach)
+        around = self._passes.seen(i, self._passes.around(i, k, 0.0))
+        reference = surfels(around, match.patch, match.reach)
         start[2] = mean[2] + wrap(start[2] - mean[2])
         prior = information_of(_WIDEN * _cautious(P))
         registered = register(reference, seen, start, mean, prior, match.reach)
@@ -88,10 +88,16 @@ class Hypotheses:
         C = information_of(registered.information) + self._settings.floor
         if gated and squared(registered.pose, mean, C + _cautious(P)) > self._gate:
             return None
-        against = conflicts(self._keyframes[i].sight, self._keyframes[k].sight, registered.pose)
+        earlier, now = self._keyframes[i], self._keyframes[k]
+        against = conflicts(earlier.sight, now.sight, registered.pose)
         if against > self._settings.conflicts:
             return None
-        return Loop(i, k, registered.pose, C, registered.inliers - against)
+        return Loop(
+            i,
+            k,
+            *_between_sensors(UncertainPose(registered.pose, C), earlier, now),
+            registered.inliers - against,
+        )
 
     def _is_same(self, a: Loop, b: Loop) -> bool:
         """True if two places are one, known only vaguely (along a corridor)."""
@@ -99,6 +105,12 @@ class Hypotheses:
         apart = UncertainPose(relative(poses[a.i], poses[b.i]), np.zeros((3, 3)))
         pose, P = apart.compose(UncertainPose(b.pose, b.covariance))
         return squared(a.pose, pose, a.covariance + P) < self._gate
+
+
+def _between_sensors(scans: UncertainPose, earlier: Keyframe, later: Keyframe) -> UncertainPose:
+    """T_i_k of two keyframes whose scans lie so: where the sensors were at their stamps is less sure than that."""
+    begin, end = (HERE._replace(covariance=keyframe.sweep) for keyframe in (earlier, later))
+    return begin.relative(scans.compose(end))
 
 
 def _cautious(P: Array) -> Array:
