@@ -75,9 +75,7 @@ class LaserLog(Recording):
         """Read a line; None if it is not a laser's. Raises ValueError or IndexError if it is damaged."""
 
     _late = 0  # lines by which one may stand too late in the file
-    _beam_times: Array | None = (
-        None  # (N,) s after its stamp at which each beam of a scan is taken, if that is known
-    )
+    _beam_times: Array | None = None  # (N,) s after a scan's stamp at which its beams are taken, if known
 
     def _open(self, topic: str | None) -> None:
         surveys: defaultdict[str, Survey] = defaultdict(Survey)

@@ -15,7 +15,11 @@ _FASTEST = 10.0  # m/s, above which a side's encoder has jumped: some robots dri
 
 
 class TickLog(LaserLog):
-    """T_odom_sensor is dead reckoning from the encoders. Over a jump, as when they are reset, the robot stands."""
+    """T_odom_sensor is dead reckoning from the encoders. Over a jump, as when they are reset, the robot stands.
+
+    Stamps are those of the lines. A line seems to be written a revolution after its scan was taken, with the counts of
+    then: maps learn that as odometry which is ahead of the scans.
+    """
 
     tick: ClassVar[float]
     """m that a side of the robot moves in a tick of its encoder."""

@@ -40,4 +40,5 @@ def test_poses_are_what_they_claim_only_if_its_beams_were_taken_clockwise(scans)
     held, wrongly = ([share_held(several[begin:]) for begin in begins] for several in (scans, as_listed))
     assert held[0] > 0.95
     assert np.mean(held) > 0.95
+    assert wrongly[0] < 0.6
     assert np.mean(wrongly) < 0.6

@@ -108,7 +108,7 @@ class BackEnd:
             self.keyframes[node] = Keyframe(keyframe.number, scan, seen, sight(scan), sweep)
 
     def recalibrate(self, errors: Array) -> None:
-        """Take out of all steps what odometry does wrong (3,) at each, which was known less well on the way."""
+        """Take out of all steps what odometry does wrong (4,) at each, which was known less well on the way."""
         if self._steps.recalibrate(errors):
             self.graph.optimize(_SETTLED)
 

@@ -92,12 +92,8 @@ class Hypotheses:
         against = conflicts(earlier.sight, now.sight, registered.pose)
         if against > self._settings.conflicts:
             return None
-        return Loop(
-            i,
-            k,
-            *_between_sensors(UncertainPose(registered.pose, C), earlier, now),
-            registered.inliers - against,
-        )
+        tied = _between_sensors(UncertainPose(registered.pose, C), earlier, now)
+        return Loop(i, k, *tied, registered.inliers - against)
 
     def _is_same(self, a: Loop, b: Loop) -> bool:
         """True if two places are one, known only vaguely (along a corridor)."""

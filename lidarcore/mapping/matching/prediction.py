@@ -19,7 +19,7 @@ _SLOW = 0.1  # weight of the last scan in the usual time between two
 _AGREEING = 3  # scans in a row, the last of which is believed though clock or odometry break off before them
 _HIDDEN = 2.0  # s that such a break hides of the way, at least
 _LONGEST = 10.0  # and at most: after that nothing is known
-_FASTEST = 0.02  # s from scan to scan, of which no lidar takes more
+_FASTEST = 0.02  # s from scan to scan: no lidar turns faster
 
 
 class _Last(NamedTuple):
