@@ -61,7 +61,7 @@ class Persistence:
         """
         told = _Told(known.pose, known.covariance, guess.covariance, found.pose, found.covariance, change)
         self.astray, self._shared, self._covariance = _went_on(
-            self.step, self.astray, self._shared, self._covariance, told
+            self.step, self.astray, self.longer, self._shared, self._covariance, told
         )
         self.step = relative(known.pose, found.pose)
 
@@ -73,14 +73,14 @@ class Persistence:
 
 @kernel
 def _went_on(
-    step: Array, astray: Array, shared: Array, covariance: Array, told: _Told
+    step: Array, astray: Array, longer: Array, shared: Array, covariance: Array, told: _Told
 ) -> tuple[Array, Array, Array]:
     """What is unsure after a step (3,): of the pose, of the next step for what it shares with that, and by itself."""
     _, by_pose, by_step = compose_with_jacobians(told.known, step)
     to_sensor = turned_back(told.found[2])
     untold = _untold(told.guess_covariance, told.found_covariance)
     seen = _within(np.eye(3) - untold, told.found_covariance + told.known_covariance)
-    astray = _within(untold @ by_pose, astray) + _within(untold @ by_step, covariance + 2 * shared)
+    astray = _within(untold @ by_pose, astray) + _within(untold @ by_step, longer)
     gone_on = to_sensor @ untold @ by_step
     shared = _within(gone_on, shared + covariance + told.change)
     return astray, shared, _within(gone_on, covariance + told.change) + _within(to_sensor, seen)
