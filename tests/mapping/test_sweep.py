@@ -23,17 +23,20 @@ def driven(velocity, steps=20_000, end=2.0):
     return times, np.stack([x, y, headings], -1)
 
 
-def found(places, sweep=None):
-    """Velocities (T, 3) and claims (T, 3) of scans that are found at places (T, 3) in the mean time of their beams."""
-    sweep = Sweep() if sweep is None else sweep
-    scan = Scan(np.full(101, 2.0), np.linspace(-3, 3, 101), beam_times=TIMES)
+def found(places, half=HALF):
+    """Velocities (T, 3) and claims (T, 3) of scans that are found at places (T, 3) in the mean time of their beams.
+
+    That is `half` s after their stamps.
+    """
+    sweep = Sweep()
+    scan = Scan(np.full(101, 2.0), np.linspace(-3, 3, 101), beam_times=TIMES - HALF + half)
     velocities, claims, last = [], [], None
     for place in places:
         sweep.remove(scan, None, None)
-        now = compose(place, inverse(arc_end(HALF * sweep.removed)))
+        now = compose(place, inverse(arc_end(half * sweep.removed)))
         if last is not None:
             sweep.correct(scan, last, now, PERIOD)
-        last = compose(place, inverse(arc_end(HALF * sweep.removed)))
+        last = compose(place, inverse(arc_end(half * sweep.removed)))
         velocities.append(sweep.removed)
         claims.append(np.diag(sweep.covariance))
     return np.array(velocities), np.array(claims)
@@ -91,6 +94,14 @@ def test_noise_of_places_is_not_taken_for_a_change_of_speed():
     assert (velocities.std(axis=0) < of_ways).all()
     shares = (HALF * velocities).var(axis=0) / claims.mean(axis=0)
     assert ((shares > 0.3) & (shares < 1.0)).all()
+
+
+@pytest.mark.parametrize("half", [0.0, HALF, 2 * HALF])
+def test_scans_that_are_stamped_after_their_beams_tell_and_claim_the_same(half):
+    places = np.random.default_rng(2).normal(0, 1e-3, (100, 3))
+    velocities, claims = found(places, half=half)
+    for told, same in zip(found(places, half=-half), (velocities, claims), strict=True):
+        np.testing.assert_allclose(told, same, atol=1e-6)
 
 
 @pytest.mark.parametrize("covered", [[0.3, 0.1, 0.8], [0.3, -0.1, -2.0], [0.1, 0.2, 0.0]])

@@ -103,7 +103,8 @@ class Sweep:
         goes_on = _smaller(grown, before.grown)
         foreseen = before.velocity + goes_on * since
         told = mean + goes_on * since / 2
-        velocity = told + (foreseen - told) * self._half / (since + self._half)
+        apart = abs(self._half)  # beams may come before the stamp
+        velocity = told + (foreseen - told) * apart / (since + apart)
         return _Found(velocity, mean, since, grown), foreseen
 
 
