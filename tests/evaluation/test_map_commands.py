@@ -74,6 +74,27 @@ def test_a_map_is_judged_by_true_poses_and_by_relations(drive: Path, tmp_path: P
     assert re.findall(r"by the reference +(\d+): mean 0\.0000 m, 0\.000", told) == 2 * [str(len(ends))]
 
 
+def test_a_recording_is_judged_backwards(drive: Path, tmp_path: Path) -> None:
+    with np.load(drive) as file:
+        arrays = {name: file[name] for name in file}
+    for name in ("ranges", "odometry", "truth"):
+        arrays[name] = arrays[name][::-1]
+    arrays["stamps"] = arrays["stamps"].max() - arrays["stamps"][::-1]
+    np.savez(tmp_path / "backwards.npz", **arrays)
+    found, expected, forwards = (
+        re.findall("relative poses .*", said("map", *arguments))
+        for arguments in ((drive, "--backwards"), (tmp_path / "backwards.npz",), (drive,))
+    )
+    assert found == expected != forwards
+
+
+def test_relations_are_not_looked_for_in_a_recording_that_is_turned_around(drive: Path) -> None:
+    asked = ["evaluate", "map", str(drive), "--backwards", "--relations", str(drive)]
+    refused = CliRunner().invoke(cli, asked)
+    assert refused.exit_code == 2
+    assert "leave one of them out" in " ".join(refused.output.split())
+
+
 def test_poses_are_found_where_the_robot_came_by_before_and_none_elsewhere_is_believed(drive: Path) -> None:
     rows = re.findall(
         r"(one scan|six keyframes) +(\d+) +(\d+) +([\d.]+)% +(\d+) +(\d+) +(\d+)", said("relocation", drive)

@@ -41,6 +41,12 @@ def evaluate_map(
         Path | None,
         typer.Option(metavar="FILE", help="relations between scans verified by hand: t1 t2 dx dy dz r p yaw"),
     ] = None,
+    around: Annotated[
+        bool,
+        typer.Option(
+            "--backwards", help="turn the recording around in time: another drive through the same rooms"
+        ),
+    ] = False,
     own: Annotated[
         str, typer.Option(metavar="M,RAD", help="standard deviation of the reference poses themselves")
     ] = "0.02,0.005",
@@ -50,7 +56,12 @@ def evaluate_map(
 ) -> None:
     """How far a map of a recording is from reference poses: relative poses, covariances, loops, time."""
     from lidarcore import open_recording
-    from lidarcore.evaluation.maps.accuracy import has_reference, name_of_reference, read_relations
+    from lidarcore.evaluation.maps.accuracy import (
+        backwards,
+        has_reference,
+        name_of_reference,
+        read_relations,
+    )
     from lidarcore.evaluation.maps.study import is_drawn, prepared, study
 
     from ..map_run import mapper_settings
@@ -58,9 +69,15 @@ def evaluate_map(
     drawing = "--seeds" if seeds > 1 else None if seed is None else "--seed"
     _check_drawn(drawing, odometry not in ("recorded", "none"), has_reference=True)
     chosen = settings_from(settings, set_)
+    if around and relations is not None:
+        raise typer.BadParameter(
+            "Relations are found by their stamps, which --backwards changes: leave one of them out."
+        )
     sigmas = _sigmas(own)
     verified = None if relations is None else read_relations(relations)
     scans = list(open_recording(recording, topic, chosen.sensor.mask))
+    if around:
+        scans = backwards(scans)
     _check_drawn(drawing, odometry == "poor" or is_drawn(scans, odometry), has_reference(scans))
     typer.echo(f"{'reference':26} {name_of_reference(scans)}")
     for number in range(seed or 0, (seed or 0) + seeds):

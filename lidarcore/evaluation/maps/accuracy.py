@@ -89,6 +89,22 @@ def with_poor_odometry(scans: list[Scan], reference: Array, seed: int) -> list[S
     return poor
 
 
+def backwards(scans: list[Scan]) -> list[Scan]:
+    """The scans turned around in time: another drive through the same rooms, on which no setting was chosen.
+
+    Stamps are where odometry is known, as before: beams come before them.
+    """
+    last = max((scan.stamp for scan in scans), default=0.0)
+    return [
+        replace(
+            scan,
+            stamp=last - scan.stamp,
+            beam_times=None if scan.beam_times is None else -scan.beam_times,
+        )
+        for scan in reversed(scans)
+    ]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Relations:
     """Relative poses T_1_2 (M, 3) between stamps (M, 2) s, verified by hand."""
