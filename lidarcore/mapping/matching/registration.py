@@ -14,6 +14,7 @@ from lidarcore.mapping.matching.surfels import Surfels, nearest
 _SIDE = 0.8  # cosine of the largest angle between two surfaces that can be the same one
 _ROUNDS, _CONVERGED = 25, 1e-4  # m and rad
 _SHRINK, _LEAST = 0.7, 1 / 3  # the reach falls by this factor each round, down to this share
+_FOUND = 0.2  # of what a scan sees across a direction, less of which lies on the map by chance
 _CAUCHY = 4.0  # squared standard deviations at which a distance counts half
 
 
@@ -44,7 +45,8 @@ def register(
     Surfaces are looked for within `reach` m at first, then nearer; only there if the start is where the scan lay
     already, but for what has been mended of it since.
     Where the match disagrees with the guess by more than chance allows (wheels that slip), the guess counts less;
-    where the surfaces say nothing (along a corridor), it counts fully.
+    where the surfaces say nothing (along a corridor), it counts fully. So it does where few of those that would say
+    something lie on the map, and the guess leaves open where: along a corridor, some of the doors fit other ones.
     """
     x, H = np.array(start), np.empty((3, 3))
     least = _LEAST * reach
@@ -58,9 +60,16 @@ def _register(
     map: Surfels, scan: Patches, x: Array, guess: Array, prior: Array, reach: float, least: float, H: Array
 ) -> float:
     g, B, share = np.empty(3), np.empty((3, 3)), 0.0
+    across, is_open = np.empty((2, 2, 2)), False
+    P = np.linalg.inv(prior)[:2, :2].copy()
     for _ in range(_ROUNDS):
-        share = linearised(map, scan, x, reach, H, B, g)
+        share = linearised(map, scan, x, reach, H, B, g, across)
         _without_pretence(H, B, g)
+        weakest = _weakest(across[1])
+        if reach == least and weakest @ P @ weakest > least**2 and _is_chance(across, weakest):
+            is_open = True
+        if is_open:
+            _leave_open(H, g, weakest)
         off = guess - x
         off[2] = wrap(off[2])
         weight = compiled_trust(off @ prior @ off, DOUBTFUL)
@@ -74,12 +83,15 @@ def _register(
 
 
 @kernel
-def linearised(map: Surfels, scan: Patches, x: Array, reach: float, H: Array, B: Array, g: Array) -> float:
+def linearised(
+    map: Surfels, scan: Patches, x: Array, reach: float, H: Array, B: Array, g: Array, across: Array
+) -> float:
     """Information H (3, 3) and gradient g (3,) of the distances at a pose x (3,); returns the share of inliers.
 
     B (3, 3) is the part of H that is nothing but errors of the normals: n n^T is too large by var(n) t t^T.
+    across (2, 2, 2) is what those patches that lie on nothing (0), and on the map (1), would say of a place, and do.
     """
-    H[:], B[:], g[:] = 0.0, 0.0, 0.0
+    H[:], B[:], g[:], across[:] = 0.0, 0.0, 0.0, 0.0
     c, s = np.cos(x[2]), np.sin(x[2])
     on, all_of_them = 0.0, 0.0
     for i in range(len(scan.means)):
@@ -87,6 +99,8 @@ def linearised(map: Surfels, scan: Patches, x: Array, reach: float, H: Array, B:
         mx, my = rotate(c, s, scan.normals[i, 0], scan.normals[i, 1])
         all_of_them += scan.counts[i]
         k = nearest(map, x[0] + dx, x[1] + dy, mx, my, reach, _SIDE)
+        if scan.counts[i] > 0:
+            _add_normal(across[int(k >= 0)], mx, my, 1 / scan.variances[i])
         if k < 0:
             continue
         on += scan.counts[i]
@@ -111,6 +125,37 @@ def _add(H: Array, g: Array, a: float, b: float, c: float, w: float, r: float) -
     g[0] += w * a * r
     g[1] += w * b * r
     g[2] += w * c * r
+
+
+@kernel
+def _add_normal(A: Array, a: float, b: float, w: float) -> None:
+    A[0, 0] += w * a * a
+    A[0, 1] += w * a * b
+    A[1, 1] += w * b * b
+    A[1, 0] = A[0, 1]
+
+
+@kernel
+def _weakest(A: Array) -> Array:
+    """Direction (2,) of which A (2, 2) says least."""
+    strongest = np.arctan2(2 * A[0, 1], A[0, 0] - A[1, 1]) / 2
+    return np.array([-np.sin(strongest), np.cos(strongest)])
+
+
+@kernel
+def _is_chance(across: Array, v: Array) -> bool:
+    """Whether most of what a scan sees across a direction v (2,) lies on nothing: what does fits by chance."""
+    nowhere, there = v @ across[0] @ v, v @ across[1] @ v
+    return there < _FOUND * (nowhere + there)
+
+
+@kernel
+def _leave_open(H: Array, g: Array, v: Array) -> None:
+    """Let the distances say nothing of where the scan lies along a direction v (2,)."""
+    kept = np.eye(3)
+    kept[:2, :2] -= np.outer(v, v)
+    H[:] = kept @ H @ kept
+    g[:] = kept @ g
 
 
 @kernel
