@@ -13,7 +13,7 @@ from lidarcore.mapping.graph.adjustment import _VAGUE, Surfaces, normal_equation
 from lidarcore.mapping.graph.adjustment_cells import Groups
 from lidarcore.mapping.graph.cell_lines import Noise, Observations
 from lidarcore.mapping.graph.equations import Step
-from lidarcore.mapping.graph.refinement import refine
+from lidarcore.mapping.graph.refinement import _observations, refine
 from lidarcore.mapping.graph.surface_noise import measured
 from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
@@ -33,8 +33,9 @@ def seen_from(world: World, poses, rng):
 def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_eliminated():
     """Three keyframes see one wall in one cell: the dense problem has 9 + 9 + 2 unknowns, with the speeds of each.
 
-    Its normal is that of the line through all patches, each as two points 3 cm from its middle. What is left of the
-    speeds is what each keyframe says, its own pose unknown, but for something that makes even one wall tell all.
+    Its normal is that of the line through all patches, each as two points 3 cm from its middle, and turns with the
+    first keyframe. What is left of the speeds is what each keyframe says, its own pose unknown, but for something that
+    makes even one wall tell all.
     """
     rng = np.random.default_rng(1)
     poses = np.array([[0, 0, 0.1], [0.1, 0.2, -0.2], [-0.1, 0.1, 0.3]])
@@ -62,7 +63,7 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
         then = compose(at[keyframes], since[:, None] * speeds[keyframes])
         placed = np.array([act(pose, m) for pose, m in zip(then, means, strict=True)])
         r = (placed - middle) @ normal - x[18] - x[19] * t0
-        return np.append(np.sqrt(weights) * r, x[19] / 1.0)
+        return np.append(np.sqrt(weights) * r, x[19] + x[2] - poses[0, 2])
 
     t0 = (world - middle) @ [-normal[1], normal[0]]
     x0 = np.append(poses.ravel(), np.zeros(11))
@@ -77,6 +78,25 @@ def test_the_normal_equations_are_those_of_poses_and_lines_with_the_lines_elimin
         P = np.linalg.inv(schur[np.ix_(of_k, of_k)] + np.diag(_VAGUE))
         np.testing.assert_allclose(left[k, 0], -(P @ rest[of_k])[3:], rtol=1e-3, atol=1e-6)
         np.testing.assert_allclose(left[k, 1], np.diag(P)[3:], rtol=1e-3)
+
+
+def test_what_keyframes_see_of_each_other_tells_nothing_of_how_the_map_lies():
+    """Of moving and turning all poses as one: each cell had told how the map is turned, to 1 rad; hundreds, to .05."""
+    poses = np.array([[0.3 * k, 0.1, 0.1 * k] for k in range(8)])
+    scans = seen_from(
+        furnished_room(), relative(np.array([-3.0, -2.0, 0.0]), poses), np.random.default_rng(5)
+    )
+    seen = _observations(scans, None, 0.0)
+    equations, _ = normal_equations(Surfaces(seen, np.zeros(8, np.int64), 0.5), poses, Noise(1.0, 1e-6))
+    H, as_one = equations.information(), np.zeros((8, 3, 3))
+    as_one[:] = np.eye(3)
+    as_one[:, :2, 2] = poses[:, :2] @ [[0, 1], [-1, 0]]
+    as_one = as_one.reshape(24, 3)
+    assert equations.lines.shape[1] > 2 * 20  # two unknowns for each cell's line
+    assert H.diagonal().min() > 1e4
+    print(as_one.T @ H @ as_one, as_one.T @ equations.gradient)
+    np.testing.assert_allclose(as_one.T @ H @ as_one, 0.0, atol=1e-3)
+    np.testing.assert_allclose(as_one.T @ equations.gradient, 0.0, atol=1e-3)
 
 
 def test_a_wall_that_bends_has_the_directions_of_its_parts():

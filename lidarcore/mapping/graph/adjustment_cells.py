@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array, Ints
 from lidarcore.compiled import kernel
-from lidarcore.mapping.graph.cell_lines import CellFit, Noise, Observations, fit_line
+from lidarcore.mapping.graph.cell_lines import UPRIGHT, CellFit, Noise, Observations, fit_line
 
 
 class Groups(NamedTuple):
@@ -75,6 +75,12 @@ def sum_cells(
                 lever += w * t[j]
                 total += w
                 j += 1
+            if (
+                i == low
+            ):  # normals turn with who saw them: else each cell would tell how the map itself is turned
+                D[k, 2, 2] += UPRIGHT
+                S[2, 1] -= UPRIGHT
+                g[k, 2] += UPRIGHT * b
             for p in range(n):
                 U[number, p, 0] = S[p, 0] * l00 + S[p, 1] * l10
                 U[number, p, 1] = S[p, 1] * l11

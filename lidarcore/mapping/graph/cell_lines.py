@@ -7,7 +7,7 @@ import numpy as np
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.compiled import kernel
 
-_TILT = 1.0  # rad of a cell's line from the mean of its normals: held to 0.1, maps of long corridors bent
+UPRIGHT = 1.0  # 1/rad², with which a cell's line is held across the mean of its normals: by 100, long corridors bent
 _OUTLIER = 9.0  # squared standard deviations from which on a patch counts less
 _BENT = 16.0  # squared standard deviations by which one of hundreds of lines is turned, if not by chance
 _PASSES = 4  # over a cell, until outliers no longer move its line
@@ -124,7 +124,7 @@ def _fit(turned: Observations, noise: Noise, low: int, high: int, fit: CellFit) 
     r, t, weights, N, a, b = fit.r, fit.t, fit.weights, fit.N, 0.0, 0.0
     for turn in range(_PASSES):
         N[:], m0, m1 = 0.0, 0.0, 0.0
-        N[1, 1] = 1 / _TILT**2
+        N[1, 1] = UPRIGHT
         for i in range(low, high):
             w = weights[i]
             N[0, 0] += w
