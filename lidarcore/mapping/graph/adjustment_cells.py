@@ -75,9 +75,7 @@ def sum_cells(
                 lever += w * t[j]
                 total += w
                 j += 1
-            if (
-                i == low
-            ):  # normals turn with who saw them: else each cell would tell how the map itself is turned
+            if i == low:  # as normals do, the line turns with who saw it: no cell tells how the map is turned
                 D[k, 2, 2] += UPRIGHT
                 S[2, 1] -= UPRIGHT
                 g[k, 2] += UPRIGHT * b
