@@ -94,7 +94,6 @@ def test_what_keyframes_see_of_each_other_tells_nothing_of_how_the_map_lies():
     as_one = as_one.reshape(24, 3)
     assert equations.lines.shape[1] > 2 * 20  # two unknowns for each cell's line
     assert H.diagonal().min() > 1e4
-    print(as_one.T @ H @ as_one, as_one.T @ equations.gradient)
     np.testing.assert_allclose(as_one.T @ H @ as_one, 0.0, atol=1e-3)
     np.testing.assert_allclose(as_one.T @ equations.gradient, 0.0, atol=1e-3)
 

@@ -7,7 +7,7 @@ import numpy as np
 from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.compiled import kernel
 
-UPRIGHT = 1.0  # 1/rad², with which a cell's line is held across the mean of its normals: by 100, long corridors bent
+UPRIGHT = 1.0  # 1/rad², with which a cell's line is held across the mean of its normals: patches tell more
 _OUTLIER = 9.0  # squared standard deviations from which on a patch counts less
 _BENT = 16.0  # squared standard deviations by which one of hundreds of lines is turned, if not by chance
 _PASSES = 4  # over a cell, until outliers no longer move its line
