@@ -92,8 +92,7 @@ class Mapper:
             return
         self._smooth_motion()
         self._back.recalibrate(self._front.wheels)
-        if self._back.search_again():
-            self._back.search_again()
+        self._back.search_again()
         for _ in range(_SEARCHES):
             if not self._back.search_beside():
                 break

@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.geometry import HERE, UncertainPose, compose, pose_difference, relative
-from lidarcore.mapping.graph.known import Known, known, known_besides, near_unknown
+from lidarcore.mapping.graph.known import JointPoses, Known, known, known_besides, near_unknown
 from lidarcore.mapping.graph.pose_graph import PoseGraph
 from lidarcore.mapping.graph.refinement import Refined, refine
 from lidarcore.mapping.loops.closure import LoopFinder
@@ -44,7 +44,7 @@ class BackEnd:
         self.keyframes: dict[int, Keyframe] = {}
         self._later: dict[int, deque[View]] = {}  # of a sensor that still stands, by its keyframe's node
         self._steps = Steps(self.graph)
-        self._finder = LoopFinder(self.graph, self.keyframes, settings.loops, settings.front.match)
+        self._finder = self._finder_in(self.graph)
         self._islands = Islands(self.graph, self.keyframes)
         self._last: Refined | None = None  # to which all keyframes were adjusted
 
@@ -93,11 +93,14 @@ class BackEnd:
             found += self._later.get(node, ())
         return found
 
-    def search_again(self) -> int:
-        """Look for loops at all keyframes, now that the map is better. Returns how many were closed."""
-        again = sum(self._join(node) for node in range(1, len(self.graph)))
-        again += sum(self._close(self._finder.find(node)) for node in range(1, len(self.graph)))
-        return again + self._close(self._finder.conclude())
+    def search_again(self) -> None:
+        """Look for loops at all keyframes, now that the map is better; if there are any, once more."""
+        finder = self._finder_in(self.graph)
+        for _ in range(2):
+            found = sum(self._join(node) for node in range(1, len(self.graph)))
+            found += sum(self._close(finder.find(node)) for node in range(1, len(self.graph)))
+            if not found + self._close(finder.conclude()):
+                break
 
     def renew(self, node: int, velocity: Array, acceleration: Array, sweep: Array) -> None:
         """Take more motion (3,) out of a keyframe's scan, which then stands where it should within sweep (3, 3)."""
@@ -124,8 +127,7 @@ class BackEnd:
         if not len(nodes):
             return 0
         refined = self._refined(parts)
-        finder = LoopFinder(refined, self.keyframes, self._settings.loops, self._settings.front.match)
-        loops = finder.find_first(nodes)
+        loops = self._finder_in(refined).find_first(nodes)
         if loops:
             self.graph.move(refined.poses)
         return self._close(loops)
@@ -153,6 +155,10 @@ class BackEnd:
         refined = self._refined(parts)
         self.graph.move(refined.poses)
         return refined
+
+    def _finder_in(self, graph: JointPoses) -> LoopFinder:
+        """One that has looked for nothing yet."""
+        return LoopFinder(graph, self.keyframes, self._settings.loops, self._settings.front.match)
 
     def _parts(self) -> Known:
         reaches = np.array([_reach(keyframe.patches) for keyframe in self.keyframes.values()])

@@ -9,12 +9,13 @@ no rival that says something else has nearly as many that agree.
 import numpy as np
 
 from lidarcore.arrays import Array, Ints
-from lidarcore.geometry import chi_square_gate
+from lidarcore.geometry import UncertainPose, chi_square_gate
 from lidarcore.mapping.graph.known import JointPoses
 from lidarcore.mapping.loops.consistency import Consistency, Loop, spread, squared, support
 from lidarcore.mapping.loops.hypotheses import CAUTION, Hypotheses
 from lidarcore.mapping.loops.keyframes import Keyframe
 from lidarcore.mapping.loops.passes import Passes
+from lidarcore.mapping.loops.tried import Tried
 from lidarcore.mapping.matching.patches import Patches
 from lidarcore.mapping.settings import LoopSettings, MatchSettings
 
@@ -31,6 +32,7 @@ class LoopFinder:
         self._passes = Passes(graph, keyframes, loops, match)
         self._hypotheses = Hypotheses(graph, keyframes, self._passes, loops, match)
         self._waiting: list[Loop] = []
+        self._tried = Tried()
         self._gate = float(chi_square_gate(loops.gate, 3))
 
     def find(self, k: int) -> list[Loop]:
@@ -40,7 +42,7 @@ class LoopFinder:
         seen = self._seen(k, self._settings.before) if places else None
         for i, P in places:
             assert seen is not None
-            for loop in self._hypotheses.at(i, k, P, seen):
+            for loop in self._at(i, k, P, seen):
                 (self._waiting if self._passes.is_vague(P) else believed).append(loop)
         if self._waiting and self._waiting[-1].j == k:
             believed += self._agreeing(k)
@@ -85,6 +87,15 @@ class LoopFinder:
         alone = sum(loop.quality for loop in rivals) <= _ALONE * sum(loop.quality for loop in best)
         self._waiting = []
         return best if alone and len({loop.j for loop in best}) > 1 else []
+
+    def _at(self, i: int, k: int, P: Array, seen: Patches) -> list[Loop]:
+        """Where node k may be, on the pass of node i; P (3, 3) and `seen` as there."""
+        expected = UncertainPose(self._graph.relative(i, k)[0], P)
+        found = self._tried.get(i, k, expected)
+        if found is None:
+            found = self._hypotheses.at(i, k, P, seen)
+            self._tried.put(i, k, expected, found)
+        return found
 
     def _seen(self, k: int, before: int) -> Patches:
         """What node k and so many before it saw together, seen from node k."""

@@ -13,7 +13,7 @@ from lidarcore.arrays import Array, Ints, Singles
 from lidarcore.compiled import kernel
 from lidarcore.geometry import wrap
 from lidarcore.geometry.kernels import rotate
-from lidarcore.mapping.matching.scores import BLOCK, largest_around, score_grid, sum_blocks, sum_scores
+from lidarcore.mapping.matching.scores import BLOCK, largest_ahead, score_grid, sum_blocks, sum_scores
 from lidarcore.mapping.settings import MatchSettings
 
 _CLOSE, _CLOSE_TURN = 0.5, 0.25  # m and rad within which two poses are one
@@ -84,14 +84,14 @@ def candidates(
     unit = np.array([cell, cell, 1.0])
     centre = np.array([*(guess[:2] - low) / cell, guess[2]])
     window = _Window(centre, half, turns, sigma / unit, np.array([_CLOSE / cell, _CLOSE_TURN]))
-    cells, blocks = _cells(near / cell, window), largest_around(fine)
-    bounds, fewest = _bounds(blocks, cells, window), least * len(near)
+    cells, ahead = _cells(near / cell, window), largest_ahead(fine)
+    bounds, fewest = _bounds(ahead, cells, window), least * len(near)
     known, worth = bounds.copy(), np.flatnonzero(bounds > fewest)
     order = worth[np.argsort(-bounds.ravel()[worth])]
     while True:
         others = (besides - guess) / unit
         others[:, 2] = wrap(others[:, 2])
-        total, *shift = _search(fine, blocks, cells, bounds, known, order, others, window, fewest)
+        total, *shift = _search(fine, ahead, cells, bounds, known, order, others, window, fewest)
         if total <= fewest:
             return
         found: Array = guess + np.array(shift) * unit
@@ -114,7 +114,7 @@ def arm(points: Array) -> float:
 @kernel
 def _search(
     fine: Singles,
-    blocks: Singles,
+    ahead: Singles,
     cells: Ints,
     bounds: Array,
     known: Array,
@@ -138,7 +138,7 @@ def _search(
         t, block = divmod(n, bounds.shape[1] * bounds.shape[2])
         a, b = divmod(block, bounds.shape[2])
         u, v = (a - half[0]) * BLOCK, (b - half[1]) * BLOCK
-        limits[n] = sum_scores(fine, blocks, cells[t], u, v, flat[n], best, scores)
+        limits[n] = sum_scores(fine, ahead, cells[t], u, v, flat[n], best, scores)
         if limits[n] <= best:
             continue
         limits[n] = -np.inf
@@ -164,12 +164,12 @@ def _cells(points: Array, window: _Window) -> Ints:
 
 
 @kernel
-def _bounds(blocks: Singles, cells: Ints, window: _Window) -> Array:
+def _bounds(ahead: Singles, cells: Ints, window: _Window) -> Array:
     """(T, A, B) what no shift in a block of shifts exceeds, for each turn and block."""
     turns, half = window.turns, window.half
     A, B = 2 * half[0] + 1, 2 * half[1] + 1
     sums = np.empty((len(turns), A, (B + BLOCK - 1) // BLOCK * BLOCK), np.float32)
-    sum_blocks(blocks, cells, half, sums)
+    sum_blocks(ahead, cells, half, sums)
     bounds = np.empty((len(turns), A, B))
     for t in range(len(turns)):
         for a in range(A):

@@ -7,6 +7,7 @@ from lidarcore.compiled import finite_kernel, inlined, kernel
 
 SHIFT = 3
 BLOCK = 1 << SHIFT  # cells, side of a block of shifts
+PAIRS = BLOCK // 2  # of cells, along the same side
 _REACH = 3  # standard deviations of the blur
 _AT_ONCE = 16  # points whose scores are summed until it is looked whether a shift can still win
 
@@ -41,24 +42,34 @@ def _splat(points: Array, blur: float, grid: Singles) -> None:
 
 
 @finite_kernel
-def largest_around(fine: Singles) -> Singles:
-    """Largest score in each block and its next neighbours: what a point of the block can meet within a block's side."""
-    blocks = np.zeros((fine.shape[0] // BLOCK, fine.shape[1] // BLOCK), np.float32)
+def largest_ahead(fine: Singles) -> Singles:
+    """Largest score that a point of each pair of cells can meet within a block's side: (PAIRS, PAIRS, A, B).
+
+    The first two indices say which pair of its block that is, the others which block: pairs that are whole blocks
+    apart are neighbours. Pairs, since one meets 100 cells, and a whole block 256, of which some score well always.
+    """
+    A, B = fine.shape[0] // BLOCK, fine.shape[1] // BLOCK
+    best, ahead = np.zeros((A * PAIRS, B * PAIRS), np.float32), np.empty((PAIRS, PAIRS, A, B), np.float32)
     for i in range(fine.shape[0]):
         for j in range(fine.shape[1]):
-            a, b = i // BLOCK, j // BLOCK
-            blocks[a, b] = max(blocks[a, b], fine[i, j])
-    for a in range(blocks.shape[0]):
-        for b in range(blocks.shape[1]):
-            for c in range(a, min(a + 2, blocks.shape[0])):
-                for d in range(b, min(b + 2, blocks.shape[1])):
-                    blocks[a, b] = max(blocks[a, b], blocks[c, d])
-    return blocks
+            best[i >> 1, j >> 1] = max(best[i >> 1, j >> 1], fine[i, j])
+    for _ in range(PAIRS):
+        for i in range(A * PAIRS - 1):
+            for j in range(B * PAIRS):
+                best[i, j] = max(best[i, j], best[i + 1, j])
+    for i in range(A * PAIRS):
+        for _ in range(PAIRS):
+            for j in range(B * PAIRS - 1):
+                best[i, j] = max(best[i, j], best[i, j + 1])
+        for q in range(PAIRS):
+            for b in range(B):
+                ahead[i % PAIRS, q, i // PAIRS, b] = best[i, b * PAIRS + q]
+    return ahead
 
 
 @kernel
 def sum_scores(
-    fine: Singles, blocks: Singles, cells: Ints, u: int, v: int, bound: float, best: float, scores: Singles
+    fine: Singles, ahead: Singles, cells: Ints, u: int, v: int, bound: float, best: float, scores: Singles
 ) -> float:
     """Writes sums of the scores of points in cells (N, 2), for each shift of the block from (u, v); 0 beyond the grid.
 
@@ -73,7 +84,7 @@ def sum_scores(
             x, y = several[k, 0] + u, several[k, 1] + v
             at[k] = max(min(x, fine.shape[0] - BLOCK), 0) * width + max(min(y, width - BLOCK), 0)
             if 0 <= x < fine.shape[0] and 0 <= y < width:
-                bound -= blocks[x >> SHIFT, y >> SHIFT]
+                bound -= ahead[_pair(x), _pair(y), x >> SHIFT, y >> SHIFT]
         for a in range(BLOCK):
             _add_runs(flat, at, len(several), a * width, sums, a * BLOCK)
         if bound + scores.max() <= best:
@@ -82,26 +93,33 @@ def sum_scores(
 
 
 @finite_kernel
-def sum_blocks(blocks: Singles, cells: Ints, half: Ints, sums: Singles) -> None:
+def sum_blocks(ahead: Singles, cells: Ints, half: Ints, sums: Singles) -> None:
     """Writes what no shift in a block of shifts exceeds, (A, B) for `half` (2,) blocks of them to either side.
 
     cells (T, N, 2) are those of the points for each turn, sums (T, A, C) has room for runs of blocks, C >= B.
     """
     _, A, C = sums.shape
-    around = np.zeros((blocks.shape[0] + 2 * A, blocks.shape[1] + 2 * C), np.float32)
-    around[A : A + blocks.shape[0], C : C + blocks.shape[1]] = blocks
-    flat, at, width = around.ravel(), np.empty(cells.shape[1], np.uint64), around.shape[1]
+    around = np.zeros((PAIRS, PAIRS, ahead.shape[2] + 2 * A, ahead.shape[3] + 2 * C), np.float32)
+    around[:, :, A : A + ahead.shape[2], C : C + ahead.shape[3]] = ahead
+    flat, at, height, width = around.ravel(), np.empty(cells.shape[1], np.uint64), *around.shape[2:]
     for t in range(len(cells)):
         n, of_turn = 0, sums[t].ravel()
         for k in range(cells.shape[1]):
-            i, j = (cells[t, k, 0] >> SHIFT) - half[0] + A, (cells[t, k, 1] >> SHIFT) - half[1] + C
-            if 0 <= i <= around.shape[0] - A and 0 <= j <= width - C:
-                at[n] = i * width + j
+            x, y = cells[t, k]
+            i, j = (x >> SHIFT) - half[0] + A, (y >> SHIFT) - half[1] + C
+            if 0 <= i <= height - A and 0 <= j <= width - C:
+                at[n] = ((_pair(x) * PAIRS + _pair(y)) * height + i) * width + j
                 n += 1
         of_turn[:] = 0.0
         for a in range(A):
             for c in range(0, C, BLOCK):
                 _add_runs(flat, at, n, a * width + c, of_turn, a * C + c)
+
+
+@inlined
+def _pair(cell: int) -> int:
+    """Which pair of its block a cell is of, along one side."""
+    return (cell & (BLOCK - 1)) >> 1
 
 
 @inlined
