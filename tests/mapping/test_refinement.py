@@ -14,7 +14,7 @@ from lidarcore.mapping.graph.adjustment_cells import Groups
 from lidarcore.mapping.graph.cell_lines import Noise, Observations
 from lidarcore.mapping.graph.equations import Step
 from lidarcore.mapping.graph.refinement import _observations, refine
-from lidarcore.mapping.graph.surface_noise import measured
+from lidarcore.mapping.graph.surface_noise import UNMEASURED, measured
 from lidarcore.mapping.matching.distortion import seen_since
 from lidarcore.mapping.matching.patches import patches
 from lidarcore.mapping.motion.sweep import without
@@ -287,6 +287,13 @@ def test_unevenness_that_patches_assume_does_not_count_twice():
     np.testing.assert_allclose(uneven.poses, bare.poses, atol=1e-9)
     np.testing.assert_allclose(uneven.covariances()[4], bare.covariances()[4], rtol=1e-6)
     assert uneven.noise == pytest.approx(bare.noise)
+
+
+def test_noise_that_no_surface_tells_is_taken_to_be_usual():
+    """As of two keyframes that saw nothing in common; of no rows at all, scipy's least squares returns anything."""
+    assert measured(Groups(*np.empty((4, 0))), 2) == UNMEASURED
+    unsure = Groups(np.ones(5), np.full(5, 1e-6), np.ones(5), np.zeros(5))
+    assert measured(unsure, 2) == UNMEASURED
 
 
 def test_noise_is_measured_alike_wherever_the_adjustment_begins():

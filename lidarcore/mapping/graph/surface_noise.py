@@ -9,26 +9,37 @@ from lidarcore.mapping.graph.adjustment_cells import Groups
 from lidarcore.mapping.graph.cell_lines import Noise
 
 _ALIKE = 0.03  # share by which a variance changes, below which it is the same
+_ROUNDS, _STEADY = 20, 1e-6  # in which noise is measured, at most; share by which it changes in the last one
 UNMEASURED = Noise(1.0, 0.005**2)
 _LARGEST = 9.0  # a group whose squared residual is more than this many times as expected is an outlier
 _INNER = float(chdtr(3, _LARGEST) / chdtr(1, _LARGEST))  # times as expected the mean square of the others is
 
 
 def measured(groups: Groups, keyframes: int) -> Noise:
-    """Factor of the noise's variance, and the variance of what a group shares, from their residuals."""
+    """Factor of the noise's variance, and the variance of what a group shares, from their residuals.
+
+    What is usual, if no group tells.
+    """
     kept = (groups.left > 0.2) & (groups.near > 0)  # of the others' noise hardly anything is the ranges'
     squares, noise = groups.squares[kept] / groups.left[kept], groups.variances[kept]
     scale, shared, told = 1.0, 0.005**2, 0.0
-    for _ in range(20):
+    for _ in range(_ROUNDS):
+        before = scale, shared
         told = _told(groups, scale * groups.variances + shared, told, keyframes)
         expected = scale * noise + shared
         taken = told / (expected + told)
         inner = squares < _LARGEST * expected * (1 - taken)
+        if not inner.any():
+            break
         # Each square as it is certain, and as much as it says about the poses: those count whose claims matter.
         weights = expected[inner] ** -1.5
-        rows = np.stack([noise, np.ones(len(noise))], -1)[inner] * weights[:, None]
-        (scale, shared), _ = nnls(rows, (squares / _INNER + taken * expected)[inner] * weights)
+        seen = squares / _INNER + taken * expected
+        rows = np.stack([noise, np.ones(len(noise)), seen], -1)[inner] * weights[:, None]
+        R = np.linalg.qr(rows, mode="r")  # says the same as all the rows
+        (scale, shared), _ = nnls(R[:, :2], R[:, 2])
         scale = max(scale, 0.01)
+        if np.allclose((scale, shared), before, rtol=_STEADY, atol=0.0):
+            break
     return Noise(float(scale), float(shared))
 
 
