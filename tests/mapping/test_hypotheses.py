@@ -37,10 +37,10 @@ CORRIDOR = World(np.concatenate([side(-1.2, -0.25), side(1.2, 0.25)]))
 FURNISHED = World(np.concatenate([CORRIDOR.walls, box(22.6, 0.7), box(25.4, -1.2), box(27.0, 0.7)]))
 
 
-def newest_on_first(world, off, sigma=2.5):
+def newest_on_first(world, off, sigma=2.5, vague=None):
     """A pass along a corridor, and a few nodes of a second one that the graph has `off` m too far along.
 
-    As far as the graph knows, that is uncertain by sigma m.
+    As far as the graph knows, that is uncertain by sigma m; and the step to the node `vague` by 0.9 m.
     """
     rng = np.random.default_rng(3)
     first = np.stack([np.arange(6.0, 42.0, 0.5), np.zeros(72), np.zeros(72)], -1)
@@ -51,6 +51,8 @@ def newest_on_first(world, off, sigma=2.5):
         step, tight = relative(truth[k - 1], truth[k]), np.diag([0.01, 0.01, 0.002]) ** 2
         if k == len(first):
             step, tight = step + np.array([off, 0.0, 0.0]), np.diag([sigma, 0.3, 0.03]) ** 2
+        if k == vague:
+            tight = np.diag([0.9, 0.2, 0.02]) ** 2
         graph.connect(k - 1, graph.add(compose(graph.poses[k - 1], step)), step, tight)
     keyframes = {}
     for k, pose in enumerate(truth):
@@ -80,6 +82,20 @@ def test_what_is_vaguer_than_a_search_looks_far_is_not_searched(sigma, count):
     """It would be found by chance, and such searches took most of the time where the pose was lost often."""
     truth, graph, keyframes = newest_on_first(FURNISHED, 0.0, sigma)
     assert len(Passes(graph, keyframes, LOOPS, MATCH).worth_a_match(len(truth) - 1)) == count
+
+
+@pytest.mark.parametrize("x", np.arange(19.0, 25.0, 0.5))
+def test_a_node_is_sought_as_vaguely_as_it_is_known_from_where_it_is_sought(x):
+    """In the middle of the pass, at 21 m, a step is vague. What lies beyond it is known worse than what is nearest."""
+    _, graph, keyframes = newest_on_first(FURNISHED, 0.0, 0.3, vague=31)
+    k = len(graph) - 1
+    poses = graph.poses.copy()
+    poses[72:, 0] += x - HERE[0]
+    graph.move(poses)
+    sought = Passes(graph, keyframes, LOOPS, MATCH).worth_a_match(k)
+    assert sought
+    for i, P in sought:
+        np.testing.assert_allclose(P, graph.relative(i, k).covariance)
 
 
 def test_what_was_seen_just_before_is_a_place_too():

@@ -98,12 +98,16 @@ class Islands:
         return None
 
     def _confirmed(self, found: Found, poses: Array) -> Found | None:
-        """What was found, if an earlier view from elsewhere says the same; one that does not ends what was believed."""
+        """What was found, if an earlier view from elsewhere says the same; one that does not ends what was believed.
+
+        Views that share keyframes are one: what looks alike in a corridor that is driven the other way does in both.
+        """
         if not all(_agree(view, found, poses) for view in self._views):
             self._views.clear()
+        others = [poses[view.k] for view in self._views if found.k - view.k >= _TOGETHER]
         self._views.append(found)
-        way = [np.hypot(*(poses[view.k] - poses[found.k])[:2]) for view in self._views]
-        return found if max(way) >= _APART else None
+        way = [np.hypot(*(other - poses[found.k])[:2]) for other in others]
+        return found if max(way, default=0.0) >= _APART else None
 
 
 def moved(poses: Array, nodes: Ints, found: Found) -> Array:

@@ -42,17 +42,24 @@ class Passes:
             closest = int(run[np.argmin(distances[run])])
             P = self._graph.relative(closest, k)[1]
             radius = min(settings.distance + settings.sigmas * spread(P), settings.farthest)
-            if P[2, 2] > VAGUE**2 or spread(P) > self._farthest or distances[closest] > radius:
-                continue
-            if (np.diagonal(P) < _KNOWN**2).all():
-                continue
-            if np.linalg.eigvalsh(P)[0] <= 0:  # of islands, rounding may leave nothing
+            if distances[closest] > radius or not self._is_sought(P):
                 continue
             best = self.best(run[distances[run] < radius], k, P)
-            if best is not None:
-                found.append((float(np.linalg.det(P)), best, P))
+            if best is None:
+                continue
+            if best != closest:  # from where node k may be known far better, or worse
+                P = self._graph.relative(best, k)[1]
+                if not self._is_sought(P):
+                    continue
+            found.append((float(np.linalg.det(P)), best, P))
         found.sort(key=lambda place: -place[0])
         return [(i, P) for _, i, P in found[: settings.places]]
+
+    def _is_sought(self, P: Array) -> bool:
+        """Whether a loop would tell anything that a search can find, where the graph knows a pose within P (3, 3)."""
+        if P[2, 2] > VAGUE**2 or spread(P) > self._farthest or (np.diagonal(P) < _KNOWN**2).all():
+            return False
+        return bool(np.linalg.eigvalsh(P)[0] > 0)  # of islands, rounding may leave nothing
 
     def best(self, nodes: Ints, k: int, P: Array) -> int | None:
         """The node that saw most of what node k sees, or the nearest that saw enough; None if none did.
