@@ -92,6 +92,23 @@ def test_parts_too_far_apart_to_have_seen_one_surface_are_not_told_of():
     assert (near_unknown(graph, vague, 0.6) == np.arange(16, 160, 16)).all()
 
 
+def test_a_loop_makes_parts_known_where_it_ties_them_though_their_middles_are_not():
+    """As that of an island, which a single loop ties at its end; one from where too little was seen ties nothing."""
+    graph, loop, within = chain(160), np.diag([0.02, 0.02, 0.001]), 0.25
+    graph.connect(0, 159, relative(graph.poses[0], graph.poses[159]), loop, doubted=True)
+    graph.optimize()
+    assert np.sqrt(np.trace(graph.relative(0, 159).covariance[:2, :2])) < within
+    ties, reaches = np.array([[0, 159]]), everywhere(graph)
+    parts = known(graph, within, steps(graph), reaches)
+    begin, end = parts.part[[0, 159]]
+    assert not parts.pairs[begin, end]
+    assert known(graph, within, steps(graph), reaches, ties).pairs[[begin, end], [end, begin]].all()
+    assert known(graph, within, steps(graph), reaches, ties).pairs.sum() == parts.pairs.sum() + 2
+    assert not known(graph, 0.1, steps(graph), reaches, ties).pairs[0, -1]
+    reaches[159] = 0.0
+    assert not known(graph, within, steps(graph), reaches, ties).pairs[begin, end]
+
+
 @given(st.integers(0, 2**32 - 1))
 def test_all_parts_that_may_have_seen_one_surface_are_told_of(seed):
     """By brute force: two keyframes may have seen one surface if the circles that they saw meet."""

@@ -11,6 +11,7 @@ from lidarcore.arrays import Array, Bools, Ints
 from lidarcore.compiled import kernel
 from lidarcore.geometry import UncertainPose
 
+_NO_TIES = np.empty((0, 2), np.int64)
 _TOGETHER = 16  # successive keyframes that are judged as one part of the way, at most
 
 
@@ -38,8 +39,11 @@ class Known(NamedTuple):
     reaches: Array
 
 
-def known(joint: JointPoses, within: float, steps: Array, reaches: Array) -> Known:
+def known(joint: JointPoses, within: float, steps: Array, reaches: Array, ties: Ints = _NO_TIES) -> Known:
     """The parts of a way; two are known if the place of one, seen from the other, has a deviation below `within` m.
+
+    A part's place is its middle, or where one of the ties (L, 2), from keyframe to keyframe, begins or ends: seen from
+    there, the rest of a part is known as well, but from the middles of both it need not be.
 
     steps (K - 1, 3, 3) are the covariances of the keyframes, each seen from the one before it. Neighbours are known if
     the step between them is, unless one saw too little: reaches (K,) m tell how far each saw, 0 if that is so.
@@ -50,6 +54,9 @@ def known(joint: JointPoses, within: float, steps: Array, reaches: Array) -> Kno
     pairs = np.eye(part[-1] + 1, dtype=bool)
     a = np.flatnonzero(reached)
     pairs[a, a + 1] = pairs[a + 1, a] = True
+    for i, j in ties[(reaches[ties] > 0).all(axis=1)].tolist():
+        if _is_known(joint, i, j, within):
+            pairs[part[i], part[j]] = pairs[part[j], part[i]] = True
     return known_besides(Known(part, pairs, reaches), joint, within)
 
 

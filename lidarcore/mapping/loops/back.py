@@ -162,7 +162,8 @@ class BackEnd:
 
     def _parts(self) -> Known:
         reaches = np.array([_reach(keyframe.patches) for keyframe in self.keyframes.values()])
-        return known(self.graph, self._settings.front.match.reach, self._steps.covariances(), reaches)
+        ties = np.array([(loop.i, loop.j) for loop in self.loops], np.int64).reshape(-1, 2)
+        return known(self.graph, self._settings.front.match.reach, self._steps.covariances(), reaches, ties)
 
     def _refined(self, parts: Known) -> Refined:
         match, sweeps = self._settings.front.match, [keyframe.sweep for keyframe in self.keyframes.values()]
