@@ -35,7 +35,7 @@ def measured(groups: Groups, keyframes: int) -> Noise:
         weights = expected[inner] ** -1.5
         seen = squares / _INNER + taken * expected
         rows = np.stack([noise, np.ones(len(noise)), seen], -1)[inner] * weights[:, None]
-        R = np.linalg.qr(rows, mode="r")  # says the same as all the rows
+        _, R = np.linalg.qr(rows)  # says the same as all the rows
         (scale, shared), _ = nnls(R[:, :2], R[:, 2])
         scale = max(scale, 0.01)
         if np.allclose((scale, shared), before, rtol=_STEADY, atol=0.0):

@@ -101,7 +101,8 @@ def sum_blocks(ahead: Singles, cells: Ints, half: Ints, sums: Singles) -> None:
     _, A, C = sums.shape
     around = np.zeros((PAIRS, PAIRS, ahead.shape[2] + 2 * A, ahead.shape[3] + 2 * C), np.float32)
     around[:, :, A : A + ahead.shape[2], C : C + ahead.shape[3]] = ahead
-    flat, at, height, width = around.ravel(), np.empty(cells.shape[1], np.uint64), *around.shape[2:]
+    flat, at = around.ravel(), np.empty(cells.shape[1], np.uint64)
+    height, width = around.shape[2], around.shape[3]
     for t in range(len(cells)):
         n, of_turn = 0, sums[t].ravel()
         for k in range(cells.shape[1]):
