@@ -1,7 +1,7 @@
 """Islands: what is mapped after the sensor may have been carried elsewhere, until it is found in the map before.
 
 How an island lies is open, often by half a turn: no loop from a guess would find it. So it is looked for without one,
-as a robot that was switched on anywhere, and believed where two views of it say the same.
+as a robot that was switched on anywhere, and believed where two views of it that share no keyframe say the same.
 """
 
 from typing import NamedTuple
