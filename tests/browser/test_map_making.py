@@ -3,7 +3,8 @@
 import io
 import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -210,19 +211,23 @@ def test_a_name_that_is_being_typed_stays_when_another_map_comes(visitor: Visito
         server.api.delete(f"sessions/{one}").raise_for_status()
 
 
-def maker(recording: str) -> psutil.Process:
-    """The process that makes a map of a recording."""
-    found: list[psutil.Process] = []
+@contextmanager
+def held(recording: str) -> Iterator[None]:
+    """The process that makes a map of a recording stands still meanwhile, so that it cannot be finished."""
 
-    def is_found() -> bool:
-        children = psutil.Process().children(recursive=True)
-        found[:] = [
-            one for one in children if "map" in one.cmdline() and recording in " ".join(one.cmdline())
+    def makers() -> list[psutil.Process]:
+        commands = [(one, one.cmdline()) for one in psutil.Process().children(recursive=True)]
+        return [
+            one for one, parts in commands if "map" in parts and any(p.endswith(recording) for p in parts)
         ]
-        return bool(found)
 
-    wait_until(is_found, "its process runs")
-    return found[0]
+    wait_until(makers, "its process runs")
+    (process,) = makers()
+    process.suspend()
+    try:
+        yield
+    finally:
+        process.resume()
 
 
 def test_a_second_map_waits_for_the_first_one_and_can_be_given_up(visitor: Visitor) -> None:
@@ -232,17 +237,15 @@ def test_a_second_map_waits_for_the_first_one_and_can_be_given_up(visitor: Visit
     queue = page.locator("#making-queue li")
     page.get_by_role("button", name=f"Make a map of {DEMO}").click()
     expect(page.locator("#making-progress output")).to_contain_text(f"Map of {DEMO}")
-    first = maker(DEMO)
-    first.suspend()  # else it may be finished before the others wait
-    for number, recording in enumerate((WINDSOR, COPY), 1):
-        page.get_by_role("button", name=f"Make a map of {recording}").click()
-        expect(queue).to_have_count(number)
-    expect(queue).to_have_text([f"Map of {WINDSOR}: waiting", f"Map of {COPY}: waiting"])
-    expect(queue.last).to_be_in_viewport()
-    page.get_by_role("button", name=f"Do not make the map of {WINDSOR}").press("Enter")
-    expect(queue).to_have_text([f"Map of {COPY}: waiting"])
-    expect(page.get_by_role("button", name=f"Do not make the map of {COPY}")).to_be_focused()
-    first.resume()
+    with held(DEMO):
+        for number, recording in enumerate((WINDSOR, COPY), 1):
+            page.get_by_role("button", name=f"Make a map of {recording}").click()
+            expect(queue).to_have_count(number)
+        expect(queue).to_have_text([f"Map of {WINDSOR}: waiting", f"Map of {COPY}: waiting"])
+        expect(queue.last).to_be_in_viewport()
+        page.get_by_role("button", name=f"Do not make the map of {WINDSOR}").press("Enter")
+        expect(queue).to_have_text([f"Map of {COPY}: waiting"])
+        expect(page.get_by_role("button", name=f"Do not make the map of {COPY}")).to_be_focused()
     page.locator("#making-progress").get_by_role("button", name="Cancel").click()
     expect(page.locator("#making-progress output")).to_contain_text(f"Map of {COPY}")
     expect(queue).to_have_count(0)
