@@ -202,12 +202,15 @@ class BackEnd:
         later.append(View(tracked.number, tracked.node, tracked.tie, tracked.scan))
 
     def _close(self, loops: list[Loop]) -> int:
-        for loop in loops:
+        """Tie the graph by loops, but where one of the same two nodes does already: it would count twice."""
+        tied = {(loop.i, loop.j) for loop in self.loops} if loops else set()
+        new = list({(loop.i, loop.j): loop for loop in loops if (loop.i, loop.j) not in tied}.values())
+        for loop in new:
             self.graph.connect(loop.i, loop.j, loop.pose, loop.covariance, doubted=True)
-        self.loops += loops
-        if loops:
+        self.loops += new
+        if new:
             self.graph.optimize(_SETTLED)
-        return len(loops)
+        return len(new)
 
 
 def _keyframe(tracked: Tracked) -> Keyframe:
