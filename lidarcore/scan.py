@@ -49,8 +49,7 @@ class Scan:
         ranges = as_row(self.ranges, "ranges")
         if not len(ranges):
             raise ScanError("The scan is empty: give at least one beam.")
-        if not np.isfinite(bearings).all():
-            raise ScanError("A bearing is not a finite number: give every beam its angle in radians.")
+        _check_finite(bearings)
         if np.abs(bearings).max() > MAX_BEARING:
             raise ScanError(f"Bearings reach {np.abs(bearings).max():g} rad: give radians, not degrees.")
         if not (isinstance(self.stamp, int | float) and np.isfinite(self.stamp)):
@@ -68,14 +67,33 @@ class Scan:
                 raise ScanError(
                     f"{name} has {len(column)} entries, bearings has {len(bearings)}: make them equal."
                 )
-        if not _follows_the_ring(bearings):
-            order = np.argsort(bearings % (2 * np.pi), kind="stable")
-            columns = {name: column[order] for name, column in columns.items()}
+        columns = _along_the_ring(columns)
         if self.odometry is not None:
             columns["odometry"] = _as_pose(self.odometry, "odometry", known=3)
         if self.truth is not None:
             columns["truth"] = _as_pose(self.truth, "truth", known=2)
         columns["gaps"] = _as_sectors(self.gaps)
+        self._keep(columns)
+
+    def with_beams(self, ranges: Array, bearings: Array) -> "Scan":
+        """The scan with other ranges and bearings (N,) of its beams, arrays that it keeps.
+
+        To check them as those of a new scan takes as long as to compute them: ranges must be above 0, or NaN.
+        Raises ScanError if a bearing is not finite.
+        """
+        _check_finite(bearings)
+        scan = object.__new__(Scan)
+        vars(scan).update({name: getattr(self, name) for name in self.__dataclass_fields__})
+        columns = {
+            "ranges": ranges,
+            "bearings": bearings,
+            "quality": self.quality,
+            "beam_times": self.beam_times,
+        }
+        scan._keep(_along_the_ring({name: column for name, column in columns.items() if column is not None}))
+        return scan
+
+    def _keep(self, columns: dict[str, Array]) -> None:
         for name, column in columns.items():
             column.flags.writeable = False
             object.__setattr__(self, name, column)
@@ -113,6 +131,11 @@ def as_row(values: ArrayLike, name: str) -> Array:
     return row
 
 
+def _check_finite(bearings: Array) -> None:
+    if not np.isfinite(bearings).all():
+        raise ScanError("A bearing is not a finite number: give every beam its angle in radians.")
+
+
 def _as_pose(values: ArrayLike, name: str, known: int) -> Array:
     """A private pose (3,) whose first `known` numbers are finite."""
     pose = as_row(values, name)
@@ -130,9 +153,17 @@ def _as_sectors(gaps: ArrayLike) -> Array:
     return sectors
 
 
+def _along_the_ring(columns: dict[str, Array]) -> dict[str, Array]:
+    """Columns (N,) of beams as they are if their bearings follow the ring, else sorted by them."""
+    bearings = columns["bearings"]
+    if _follows_the_ring(bearings):
+        return columns
+    order = np.argsort(bearings % (2 * np.pi), kind="stable")
+    return {name: column[order] for name, column in columns.items()}
+
+
 def _follows_the_ring(bearings: Array) -> bool:
     """True if bearings grow all the way around, with at most one step back, and stay within one turn."""
-    steps_back = np.diff(bearings) < 0
-    wraps = int(steps_back.sum())
+    wraps = np.count_nonzero(bearings[1:] < bearings[:-1])
     turn = bearings[-1] - bearings[0] + 2 * np.pi * wraps
     return bool(wraps <= 1 and turn <= 2 * np.pi + 1e-9)

@@ -1,6 +1,6 @@
 """Takes the distortion out of a scan whose sensor moved and turned while it was measuring."""
 
-from dataclasses import replace
+from math import isfinite
 
 import numpy as np
 
@@ -42,14 +42,15 @@ def deskew(scan: Scan, v: float, w: float, u: float = 0.0, acceleration: Velocit
     v m/s ahead, u m/s to the left and w rad/s, constant during the revolution: each point is carried along the arc
     that the sensor had covered when its beam was measured. With an acceleration (m/s², rad/s², m/s² of v, w, u) they
     are the speeds in the mean time of the beams.
-    Raises LocalizationError if the scan has no finite beam times, or a speed is not finite.
+    Raises LocalizationError if the scan has no finite beam times, or a speed is not finite; ScanError if the sensor
+    turned farther than numbers go.
     """
     if scan.beam_times is None or not np.isfinite(scan.beam_times).all():
         raise LocalizationError("The scan has no beam times: without them its distortion cannot be removed.")
-    if not np.isfinite([v, w, u, *acceleration]).all():
+    if not all(map(isfinite, (v, w, u, *acceleration))):
         raise LocalizationError(f"The speed is {v} and {u} m/s and {w} rad/s: give finite numbers.")
     ranges, bearings = _carried(scan.ranges, scan.bearings, scan.beam_times, (v, w, u), acceleration)
-    return replace(scan, ranges=ranges, bearings=bearings)
+    return scan.with_beams(ranges, bearings)
 
 
 def skew(points: Points, times: Array, v: float, w: float, u: float) -> Points:
@@ -70,12 +71,13 @@ def _carried(
         x, y, turned = _arc(times[k], v, w, u)
         bend = times[k] * (times[k] / 2 - mean)
         bearing = bearings[k] + turned + dw * bend
-        if np.isnan(ranges[k]):
-            carried[k], seen_at[k] = np.nan, wrap(bearing)
-            continue
         x += dv * bend + ranges[k] * np.cos(bearing)
         y += du * bend + ranges[k] * np.sin(bearing)
-        carried[k], seen_at[k] = np.hypot(x, y), np.arctan2(y, x)
+        carried[k] = np.sqrt(x * x + y * y)
+        if 0 < carried[k] < np.inf:
+            seen_at[k] = np.arctan2(y, x)
+        else:  # no return, or carried farther than numbers go
+            carried[k], seen_at[k] = np.nan, wrap(bearing)
     return carried, seen_at
 
 

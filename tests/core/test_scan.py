@@ -55,6 +55,30 @@ def test_more_than_a_turn_is_sorted_into_one_ring():
     assert (np.diff(scan.bearings % (2 * np.pi)) > 0).all()
 
 
+@given(bearings=angles, seed=st.integers(0, 2**32 - 1))
+def test_other_ranges_and_bearings_of_a_scan_make_the_scan_that_has_them(bearings, seed):
+    """In any order: every other field stays, and goes along where it has a value for each beam."""
+    rng = np.random.default_rng(seed)
+    n = len(bearings)
+    rest = {"quality": rng.random(n), "beam_times": rng.random(n), "stamp": 3.0, "odometry": [1, 2, 3],
+            "truth": [4, 5, 6], "gaps": [[0.1, 0.2]]}  # fmt: skip
+    before = Scan(np.full(n, np.nan), np.linspace(-1, 1, n), **rest)
+    ranges = np.where(rng.random(n) < 0.3, np.nan, rng.random(n) + 1)
+    assert not before.valid.any()
+    scan, expected = before.with_beams(ranges, np.array(bearings)), Scan(ranges, bearings, **rest)
+    for name in Scan.__dataclass_fields__:
+        np.testing.assert_array_equal(getattr(scan, name), getattr(expected, name), name)
+    assert (scan.valid == expected.valid).all()
+    assert not any(getattr(scan, name).flags.writeable for name in ("ranges", "bearings", "quality"))
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_other_bearings_that_are_no_numbers_are_refused(bad):
+    scan = Scan([1.0, 2.0], [0.0, 0.1])
+    with pytest.raises(ScanError, match="not a finite number"):
+        scan.with_beams(np.ones(2), np.array([0.0, bad]))
+
+
 @pytest.mark.parametrize("marker", [0.0, -1.0, np.inf, -np.inf, np.nan])
 def test_every_marker_of_a_missing_return_becomes_nan(marker):
     scan = Scan([1.0, marker, 2.0], [0.0, 0.1, 0.2])

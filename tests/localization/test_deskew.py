@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lidarcore import Scan, extract
-from lidarcore.errors import LocalizationError
+from lidarcore.errors import LocalizationError, ScanError
 from lidarcore.localization.deskewing import deskew
 from lidarcore.localization.ekf.motion_kernels import arc
 from lidarcore.simulation.rooms import rectangular_room
@@ -61,6 +61,18 @@ def test_a_missing_return_stays_missing() -> None:
     ranges[100:110] = np.nan
     straightened = deskew(Scan(ranges, BEARINGS, beam_times=TIMES), 1.0, 1.0)
     assert (~straightened.valid).sum() == 10
+
+
+def test_returns_carried_farther_than_numbers_go_are_lost() -> None:
+    found = deskew(moving_scan(0, 0), 1e200, 0)
+    assert found.valid.tolist() == [True] + 599 * [False]
+    assert np.isfinite(found.bearings).all()
+
+
+def test_a_sensor_that_turned_farther_than_numbers_go_is_refused() -> None:
+    scan = Scan(np.ones(2), np.array([0.0, 0.1]), beam_times=np.array([0.0, 10.0]))
+    with pytest.raises(ScanError, match="not a finite number"):
+        deskew(scan, 0, 1e308)
 
 
 def test_without_beam_times_it_says_so() -> None:

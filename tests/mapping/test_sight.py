@@ -44,3 +44,23 @@ def test_nothing_is_known_between_returns_twice_as_far_apart_as_most_beams(beams
     bearings = np.concatenate([[0.0], np.cumsum(gaps)]) * 6.283 / gaps.sum() - np.pi + 1e-5
     expected = max(0.1, 2 * np.median(np.diff(bearings)))
     assert sight(Scan(np.ones(beams), bearings)).apart == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("first", [-2 * np.pi, -3.0, 0.0, 1.0, np.pi, 5.0])
+@pytest.mark.parametrize("turn", [np.pi, 2 * np.pi, 2 * np.pi + 1e-9])
+@pytest.mark.parametrize("lost", [slice(0), slice(0, 7), slice(20, 60, 3), slice(None)])
+def test_returns_come_in_the_order_of_their_bearings(first: float, turn: float, lost: slice) -> None:
+    """Whichever beam the ring begins with, also where the last one lies upon the first or a little past it."""
+    bearings, ranges = np.linspace(first, first + turn, 80), np.arange(1.0, 81.0)
+    ranges[lost] = np.nan
+    found = sight(Scan(ranges, bearings))
+    kept = ~np.isnan(ranges)
+    at = np.pi - (np.pi - bearings[kept]) % (2 * np.pi)
+    order = np.argsort(at, kind="stable")
+    np.testing.assert_array_equal(found.bearings, at[order])
+    assert sorted(found.ranges) == sorted(ranges[kept])
+    np.testing.assert_allclose(
+        np.interp(found.ranges, np.arange(1.0, 81.0), bearings) % (2 * np.pi),
+        found.bearings % (2 * np.pi),
+        atol=1e-9,
+    )

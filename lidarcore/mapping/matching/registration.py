@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lidarcore.arrays import Array
-from lidarcore.compiled import kernel
+from lidarcore.compiled import inlined, kernel
 from lidarcore.geometry.kernels import rotate, wrap
 from lidarcore.mapping.doubt import DOUBTFUL, compiled_trust
 from lidarcore.mapping.matching.patches import Patches
@@ -115,7 +115,7 @@ def linearised(
     return on / max(all_of_them, 1.0)
 
 
-@kernel
+@inlined
 def _add(H: Array, g: Array, a: float, b: float, c: float, w: float, r: float) -> None:
     H[0, 0] += w * a * a
     H[0, 1] += w * a * b
@@ -129,7 +129,7 @@ def _add(H: Array, g: Array, a: float, b: float, c: float, w: float, r: float) -
     g[2] += w * c * r
 
 
-@kernel
+@inlined
 def _add_normal(A: Array, a: float, b: float, w: float) -> None:
     A[0, 0] += w * a * a
     A[0, 1] += w * a * b

@@ -6,8 +6,8 @@ import numpy as np
 
 from lidarcore.arrays import Array
 from lidarcore.compiled import kernel
-from lidarcore.geometry import relative, wrap
-from lidarcore.geometry.kernels import rotate
+from lidarcore.geometry import relative
+from lidarcore.geometry.kernels import rotate, wrap
 from lidarcore.scan import Scan
 
 # Between returns farther apart than both nothing was seen.
@@ -32,16 +32,36 @@ class Sight(NamedTuple):
 
 def sight(scan: Scan) -> Sight:
     """The returns of a scan."""
-    bearings = wrap(scan.bearings[scan.valid])
-    order = np.argsort(bearings, kind="stable")
-    return Sight(bearings[order], scan.ranges[scan.valid][order], _apart(scan.bearings))
+    return Sight(*_sorted(scan.bearings, scan.ranges), _apart(scan.bearings))
 
 
+@kernel
+def _sorted(bearings: Array, ranges: Array) -> tuple[Array, Array]:
+    """Bearings (K,) in (-pi, pi] and ranges of the returns, of beams (N,) in the order of the ring."""
+    seen_at, seen, n, first = np.empty_like(bearings), np.empty_like(ranges), 0, 0
+    for k in range(len(ranges)):
+        if not np.isnan(ranges[k]):
+            seen_at[n], seen[n] = wrap(bearings[k]), ranges[k]
+            if seen_at[n] < seen_at[first]:
+                first = n
+            n += 1
+    seen_at = np.concatenate((seen_at[first:n], seen_at[:first]))
+    seen = np.concatenate((seen[first:n], seen[:first]))
+    if (seen_at[1:] < seen_at[:-1]).any():  # a full turn and a little more
+        order = np.argsort(seen_at, kind="mergesort")
+        return seen_at[order], seen[order]
+    return seen_at, seen
+
+
+@kernel
 def _apart(bearings: Array) -> float:
     """Rad between two returns of beams at bearings (N,) from which on nothing is known of what lies between."""
     if not 1 < len(bearings) < _MANY:
         return _APART
-    return max(_APART, _BEAMS * float(np.median(np.diff(np.sort(wrap(bearings))))))
+    turned = np.empty_like(bearings)
+    for k in range(len(bearings)):
+        turned[k] = wrap(bearings[k])
+    return float(max(_APART, _BEAMS * np.median(np.diff(np.sort(turned)))))
 
 
 @kernel

@@ -100,7 +100,7 @@ def _sorted(at: Ints, first: Ints) -> Ints:
     return order
 
 
-@kernel
+@inlined
 def nearest(map: Surfels, x: float, y: float, nx: float, ny: float, reach: float, side: float) -> int:
     """The element nearest to a place whose normal makes a cosine of at least `side` with (nx, ny); -1 if none."""
     found, closest = -1, reach * reach
