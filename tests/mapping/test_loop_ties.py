@@ -1,6 +1,8 @@
-"""What ties a map: loops of the Intel Research Lab, most of which are found again when the map is finished."""
+"""What ties a map: a loop that is found again, when the map is finished, is no other one."""
 
+import numpy as np
 import pytest
+from mapping_scenes import SETTINGS, drive, full_scan, way
 
 from lidarcore import open_recording
 from lidarcore.evaluation.maps.study import prepared
@@ -23,3 +25,16 @@ def test_a_loop_that_is_found_again_ties_the_map_only_once(data):
     tied = [(loop.i, loop.j) for loop in mapper.loops]
     assert len(tied) > 20
     assert len(set(tied)) == len(tied)
+
+
+def test_the_same_loop_twice_leaves_a_map_as_it_is():
+    mapper = Mapper(SETTINGS)
+    for scan in drive(way(0.8, 1.5), np.random.default_rng(0), scanned=full_scan):
+        mapper.step(scan)
+    back = mapper._back
+    loops, edges, poses = list(back.loops), len(back.graph.edges), back.graph.poses
+    assert len(loops) > 3
+    assert back._close(loops + loops) == 0
+    assert back.loops == loops
+    assert len(back.graph.edges) == edges
+    np.testing.assert_array_equal(back.graph.poses, poses)
