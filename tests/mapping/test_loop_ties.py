@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mapping_scenes import SETTINGS, drive, full_scan, way
+from tests.mapping.mapping_scenes import SETTINGS, drive, full_scan, way
 
 from lidarcore import open_recording
 from lidarcore.evaluation.maps.study import prepared
