@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from tests.mapping.mapping_scenes import SETTINGS, drive, full_scan, way
 
 from lidarcore import open_recording
 from lidarcore.evaluation.maps.study import prepared
 from lidarcore.mapping import Mapper
+from tests.mapping.mapping_scenes import SETTINGS, drive, full_scan, way
 
 
 @pytest.mark.real_data
