@@ -11,6 +11,7 @@ import numpy as np
 from lidarcore import tables
 from lidarcore.lines import Lines
 from lidarcore.lines.line import ABOUT_MEAN, ABOUT_TRUTH, normal_angle, to_second_order
+from lidarcore.noise_expected import noise_expected
 from lidarcore.rejections import Rejections
 from lidarcore.scan import Array, Ints, Scan
 from lidarcore.settings import Covariance, ExtractionSettings
@@ -137,8 +138,8 @@ class Corners(TableView):
 class Features:
     """Segments, corners and rejections of one scan, by one fitter.
 
-    noise_seen (m) is a robust estimate of the ranges' standard deviation from this scan alone: far above the noise
-    in the settings, the covariances claim too much.
+    noise_seen (m) is a robust estimate of the ranges' standard deviation from this scan alone: where `noise_excess` is
+    far above 1, the covariances claim too much.
     """
 
     def __init__(
@@ -164,6 +165,12 @@ class Features:
             f"{len(self.segments)} segments, {len(self.corners)} corners, {len(self.rejections)} rejections"
         )
         return f"Features({self.fitter}: {found})"
+
+    @cached_property
+    def noise_excess(self) -> float:
+        """How many times as far as the noise in the settings makes them the ranges scatter; 1 if no farther."""
+        expected = noise_expected(self.scan, self.settings.noise)
+        return max(1.0, self.noise_seen / expected) if expected else 1.0
 
     @property
     def lines(self) -> Lines:

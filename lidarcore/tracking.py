@@ -146,8 +146,7 @@ class Tracker:
 
 def _scatter(features: Features, corner: int) -> Array:
     """(2, 2) m², of a corner from scan to scan: what its method derives, and more if the scan is noisier than told."""
-    more = max(features.noise_seen / features.settings.noise.sigma_range, 1.0)
-    return more**2 * features.corners.covariance_consistent[corner]
+    return features.noise_excess**2 * features.corners.covariance_consistent[corner]
 
 
 def _assigned(ids: list[int], known: list[int], distances: Array, most: float) -> list[int]:

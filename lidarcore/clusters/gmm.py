@@ -18,15 +18,16 @@ VERY_STRONG = 10.0
 def label(points: Array, k: int | None, k_max: int, noise: SensorNoise) -> Ints:
     """Most probable component (n,) of each point (n, 2) m; at most as many components as distinct points.
 
-    Components have full covariances, and none is thinner than two standard deviations of a range: else they shrink
-    to points that happen to lie in a line, and the bent face of one post becomes two. Without k, it is the
-    smallest from 1 to k_max against which none has very strong evidence by the Bayesian information criterion
-    (Schwarz 1978); the paper uses the elbow.
+    Components have full covariances, and none is thinner than two standard deviations of a range, as far away as most
+    points are: else they shrink to points that happen to lie in a line, and the bent face of one post becomes two.
+    Without k, it is the smallest from 1 to k_max against which none has very strong evidence by the Bayesian
+    information criterion (Schwarz 1978); the paper uses the elbow.
     """
     k_most = len(np.unique(points, axis=0))
     with threadpool_limits(1):  # several add up in any order and cost more than they save
         numbers = range(1, min(k_max, k_most) + 1) if k is None else [min(k, k_most)]
-        mixtures = [_mixture(points, k, (2 * noise.sigma_range) ** 2) for k in numbers]
+        floor = 4 * float(np.median(noise.range_variances(np.hypot(*points.T))))
+        mixtures = [_mixture(points, k, floor) for k in numbers]
         criteria = np.array([mixture.bic(points) for mixture in mixtures])
     chosen = mixtures[int(np.argmax(criteria <= criteria.min() + VERY_STRONG))]
     return chosen.predict(points).astype(np.int64)

@@ -42,7 +42,7 @@ class Observations:
         Raises LocalizationError if that is clusters and there are none.
         """
         if settings.landmarks == "corners":
-            points = Points.from_corners(features.corners).scaled(_noise_ratio(features))
+            points = Points.from_corners(features.corners).scaled(features.noise_excess**2)
             points = points.blurred(settings.filter.unevenness)
             return cls(points, _moments(features, scan.beam_times))
         if clusters is None:
@@ -57,11 +57,6 @@ def _moments(features: Features, beam_times: Array | None) -> Array | None:
     if beam_times is None or not (np.isfinite(beam_times).all() and np.ptp(beam_times) > 0):
         return None
     return nearest_moments(corner_times(features, beam_times), beam_times)
-
-
-def _noise_ratio(features: Features) -> float:
-    """How many times larger than told the variance of the ranges seems to be; 1 if it is smaller."""
-    return float(np.fmax(1.0, (features.noise_seen / features.settings.noise.sigma_range) ** 2))
 
 
 MOMENTS = 4  # an eighth of a revolution is the most that a point is away from its moment

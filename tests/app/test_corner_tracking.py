@@ -5,13 +5,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from serving import room_ranges
 
-from lidarcore import ExtractionSettings, Scan, SensorNoise, compare
+from lidarcore import ExtractionSettings, Scan, compare
 from lidarcore.tracking import GATE, MEMORY, Tracker, match
 
 SIGMA = 0.005  # m, of x and y of the corners that are found
 
 
-def found(xy: list[tuple[float, float]], noise_seen: float = 0.01) -> dict:
+def found(xy: list[tuple[float, float]], noise_excess: float = 1.0) -> dict:
     """Features with corners at these places only, each between two segments of its own."""
     n = len(xy)
     corners = SimpleNamespace(
@@ -20,8 +20,7 @@ def found(xy: list[tuple[float, float]], noise_seen: float = 0.01) -> dict:
         covariance_consistent=np.tile(SIGMA**2 * np.eye(2), (n, 1, 1)),
     )
     segments = SimpleNamespace(first_beam=np.arange(2 * n), last_beam=np.arange(2 * n))
-    settings = ExtractionSettings(noise=SensorNoise(0.01, 0.001))
-    seen = SimpleNamespace(corners=corners, segments=segments, settings=settings, noise_seen=noise_seen)
+    seen = SimpleNamespace(corners=corners, segments=segments, noise_excess=noise_excess)
     return {"ml": seen}
 
 
@@ -100,12 +99,12 @@ def test_a_sensor_that_moves_finds_no_hidden_corner_again_at_its_old_place() -> 
 def test_where_the_noise_is_told_too_small_places_are_told_apart_less_finely() -> None:
     """Seen four times the noise told: 8 sigma of what is told are 2 of what is."""
     off = (ROOM[0][0] + 8 * np.sqrt(2) * SIGMA, ROOM[0][1])
-    for seen, kept in ((0.01, False), (0.04, True)):
+    for excess, kept in ((1.0, False), (4.0, True)):
         tracker = patient()
-        (first, *_) = (row.id for row in tracker.rows(found(ROOM, seen)))
+        (first, *_) = (row.id for row in tracker.rows(found(ROOM, excess)))
         for _ in range(TWO_SECONDS):
-            tracker.rows(found(ROOM[1:], seen))
-        assert (tracker.rows(found([off, *ROOM[1:]], seen))[0].id == first) is kept
+            tracker.rows(found(ROOM[1:], excess))
+        assert (tracker.rows(found([off, *ROOM[1:]], excess))[0].id == first) is kept
 
 
 def test_noise_does_not_cost_a_standing_sensor_its_ids() -> None:

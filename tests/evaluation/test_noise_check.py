@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise, extract
-from lidarcore.evaluation.calibration.noise_check import contradiction, noise_expected
+from lidarcore.evaluation.calibration.noise_check import contradiction
+from lidarcore.noise_expected import noise_expected
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 

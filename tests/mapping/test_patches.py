@@ -9,6 +9,7 @@ from lidarcore.mapping.settings import MatchSettings
 
 NEAR, FAR = 2.0, 2.4  # m ahead
 MATCH = MatchSettings(noise=SensorNoise(0.005, 0.001))
+EVERYWHERE_ALIKE = SensorNoise(0.01, 1e-6)
 
 
 def scan_of_a_board_before_a_wall(beams: int, between: float) -> Scan:
@@ -63,11 +64,26 @@ def test_walls_seen_at_a_slant_are_patches_as_far_as_beams_show_them_straight() 
     assert seen.near.means[side[~slanted], 0].max() < 6
 
 
-def patches_of_a_wall(beams: int, scatter: float, rng: np.random.Generator) -> Patches:
-    """A wall 3 m ahead whose returns scatter so far, m, along their beams."""
+def patches_of_a_wall(
+    beams: int,
+    scatter: float,
+    rng: np.random.Generator,
+    away: float = 3.0,
+    noise: SensorNoise = EVERYWHERE_ALIKE,
+) -> Patches:
+    """A wall 3 m ahead, or so far, whose returns scatter by so many m along their beams."""
     bearings = np.linspace(-0.4, 0.4, beams)
-    ranges = 3.0 / np.cos(bearings) + rng.normal(0, scatter, beams)
-    return patches(Scan(ranges, bearings), MatchSettings(noise=SensorNoise(0.01, 1e-6), unevenness=0.0))
+    ranges = away / np.cos(bearings) + rng.normal(0, scatter, beams)
+    return patches(Scan(ranges, bearings), MatchSettings(noise=noise, unevenness=0.0))
+
+
+def test_far_walls_are_known_less_where_the_noise_grows_with_the_range() -> None:
+    """At 8 m it is 20 mm, where 10 are told for ranges nearby: too little for the scatter of a few returns to show."""
+    rng, noise = np.random.default_rng(2), SensorNoise(0.01, 1e-6, range_growth=np.sqrt(0.0003) / 64)
+    seen = joined([patches_of_a_wall(25, 0.02, rng, 8.0, noise) for _ in range(400)])
+    ahead = np.abs(seen.means[:, 1]) < 1.5
+    squares = (seen.means[ahead, 0] - 8.0) ** 2 / seen.variances[ahead]
+    assert abs(squares.mean() - 1) < 4 * np.sqrt(2 / len(squares))
 
 
 @pytest.mark.parametrize("beams", [25, 100, 400])

@@ -70,7 +70,8 @@ def patches(scan: Scan, settings: MatchSettings) -> Patches:
     seen = sight(scan)
     if len(seen.bearings) < LEAST:
         return Patches(np.empty((0, 2)), np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0))
-    noise = np.array([settings.noise.sigma_range, settings.noise.sigma_bearing]) ** 2
+    told = settings.noise
+    noise = np.array([told.sigma_range, told.sigma_bearing, told.range_growth]) ** 2
     rows = _rows(seen, settings.radius, settings.gap, settings.patch, noise)
     variances = rows[:, VARIANCE] + settings.unevenness**2
     means, normals = (rows[:, column : column + 2].copy() for column in (MEAN, NORMAL))

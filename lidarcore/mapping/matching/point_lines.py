@@ -31,7 +31,10 @@ class _Sums(NamedTuple):
 
 @kernel
 def fit_lines(points: Array, ranges: Array, reaches: Array, gap: float, noise: Array, single: Array) -> None:
-    """Each point as a patch of its own: on the line of its neighbours, which it counts."""
+    """Each point as a patch of its own: on the line of its neighbours, which it counts.
+
+    noise (3,): variances of a range nearby, m², and of a bearing, and by how much the first grows with rho⁴, 1/m².
+    """
     for i in range(len(points)):
         near = _around(points, i, reaches[i] * reaches[i], max(gap, reaches[i]) ** 2)
         _fit_line(points[i], near, noise, single[i])
@@ -50,9 +53,15 @@ def _fit_line(point: Array, sums: _Sums, noise: Array, row: Array) -> None:
     square = px * px + py * py
     across = (nx * px + ny * py) ** 2
     row[MEAN], row[MEAN + 1], row[NORMAL], row[NORMAL + 1] = px, py, nx, ny
-    row[VARIANCE] = noise[0] * across / square + noise[1] * (square - across)
+    row[VARIANCE] = _range_variance(noise, square) * across / square + noise[1] * (square - across)
     row[TILT] = row[VARIANCE] / max(count * (half + root), 1e-9)
     row[COUNT], row[SCATTER] = count, max(half - root, 0.0) * count
+
+
+@inlined
+def _range_variance(noise: Array, square: float) -> float:
+    """Variance (m²) of a range, by its square."""
+    return noise[0] + noise[2] * square * square
 
 
 @inlined
@@ -87,7 +96,7 @@ def add_slanted(points: Array, bearings: Array, spacing: float, noise: Array, si
         off = (ux * vy - uy * vx) / length
         across = ((ux + vx) * points[i, 1] - (uy + vy) * points[i, 0]) / length
         square = points[i, 0] ** 2 + points[i, 1] ** 2
-        if off * off < _STRAIGHT * (noise[0] * across * across / square + _RELIEF**2):
+        if off * off < _STRAIGHT * (_range_variance(noise, square) * across * across / square + _RELIEF**2):
             _fit_line(points[i], _sum_of(-ux, -uy, vx, vy), noise, single[i])
             single[i, COUNT] = SLANTED
 

@@ -54,9 +54,8 @@ def collect_pieces(scans: Sequence[Scan], poses: Array, settings: ExtractionSett
     covariance = _stacked([features.lines.covariance for features in found], (2, 2))
     points = _stacked([features.segments.n_points.astype(np.float64) for features in found], ())
     pose = np.asarray(poses, np.float64).reshape(-1, 3)[keyframe]
-    noise = np.hypot(
-        settings.noise.sigma_range, settings.noise.sigma_bearing * np.hypot(*ends.mean(axis=1).T)
-    )
+    away = np.hypot(*ends.mean(axis=1).T)
+    noise = np.sqrt(settings.noise.range_variances(away) + (settings.noise.sigma_bearing * away) ** 2)
     ends, beyond = (act(pose[:, None], xy) for xy in (ends, beyond))
     return Pieces(
         keyframe, alpha + pose[:, 2], ends, beyond, covariance, noise, pose[:, :2], points.astype(np.int64)
