@@ -35,8 +35,8 @@ SENSORS: dict[str, SensorKind] = {
         ),
         "Means of the calibrations of 14 places in three recordings (rplidar_csv_rooms), from 300 scans each of a "
         "sensor of this class at rest: ranges 0.2 to 1.7 mm nearby, bearings 0.5 to 1.1 mrad, walls uneven by 3 to "
-        "29 mm (median 3.8, by which walls of cluttered rooms fall apart) over 5 to 17 cm. What is new in the next scan "
-        "(renewal) is 0.04; 0.1 is cautious.",
+        "29 mm (median 3.8, by which walls of cluttered rooms fall apart) over 5 to 17 cm. What is new in the next "
+        "scan (renewal) is 0.04; 0.1 is cautious.",
     ),
     "rplidar_c1": SensorKind(
         "RPLIDAR C1",
