@@ -8,7 +8,7 @@ from lidarcore.scan import Scan
 
 
 def noise_expected(scan: Scan, noise: SensorNoise) -> float:
-    """What `Features.noise_seen` (m) would be about, if the noise is as it is set; 0 of fewer than three returns.
+    """What `Features.noise_seen` (m) would be about, if the noise is as it is set; 0 if no three returns tell it.
 
     That is the scatter of a range about the mean of its neighbours. A bearing's error acts with the slope of the range,
     unevenness as far as neighbours do not share it.
@@ -18,10 +18,14 @@ def noise_expected(scan: Scan, noise: SensorNoise) -> float:
         return 0.0
     step = ((np.roll(theta, -1) - np.roll(theta, 1)) % (2 * np.pi)) / 2
     slope = (np.roll(rho, -1) - np.roll(rho, 1)) / (2 * np.maximum(step, 1e-9))
-    variances = noise.range_variances(rho) + (slope * noise.sigma_bearing) ** 2
-    if noise.unevenness:
-        variances = variances + _of_unevenness(rho, slope, step, noise)
-    return float(np.sqrt(np.median(variances)))
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # no number holds the squares of ranges that are absurd
+        variances = noise.range_variances(rho) + (slope * noise.sigma_bearing) ** 2
+        if noise.unevenness:
+            variances = variances + _of_unevenness(rho, slope, step, noise)
+    told = variances[np.isfinite(variances)]
+    return float(np.sqrt(np.median(told))) if len(told) else 0.0
 
 
 def _of_unevenness(rho: Array, slope: Array, step: Array, noise: SensorNoise) -> Array:

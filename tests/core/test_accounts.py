@@ -63,6 +63,7 @@ def assert_sound(features):
     assert np.isfinite(rows).all()
     assert np.isfinite(corner_rows).all()
     assert np.isfinite(features.noise_seen)
+    assert 1 <= features.noise_excess < np.inf
     for k, beams in enumerate(covered(features)):
         assert segments.n_points[k] == scan.valid[beams].sum() >= limits.min_points
         normal = segments.lines[k].normal
@@ -110,6 +111,7 @@ def test_a_scan_without_any_return_has_no_features(n, name):
     features = extract(Scan([np.nan] * n, np.linspace(0, 1, n)), ExtractionSettings(fitter=name))
     assert len(features.segments) == len(features.corners) == len(features.rejections) == 0
     assert np.isfinite(features.noise_seen)
+    assert 1 <= features.noise_excess < np.inf
 
 
 @pytest.mark.parametrize("returns", [1, 2, 3, 4])

@@ -50,5 +50,6 @@ def test_a_filter_does_not_doubt_corners_whose_noise_is_told() -> None:
     )
 
 
-def test_a_scan_that_sees_nothing_has_no_excess() -> None:
-    assert extract(Scan(np.full(10, np.nan), np.linspace(-3, 3, 10))).noise_excess == 1.0
+def test_a_scan_that_sees_nothing_or_what_is_absurdly_far_has_no_excess() -> None:
+    for away in (np.nan, 1e200):
+        assert extract(Scan(np.full(10, away), np.linspace(-3, 3, 10))).noise_excess == 1.0
