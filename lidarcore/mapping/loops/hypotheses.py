@@ -14,7 +14,7 @@ from lidarcore.mapping.matching.correlative import candidates
 from lidarcore.mapping.matching.patches import Patches
 from lidarcore.mapping.matching.registration import information_of, register
 from lidarcore.mapping.matching.sight import conflicts
-from lidarcore.mapping.matching.surfels import surfels
+from lidarcore.mapping.matching.surfels import Surfels, surfels
 from lidarcore.mapping.settings import LoopSettings, MatchSettings
 
 CAUTION = 4.0
@@ -92,8 +92,25 @@ class Hypotheses:
         against = conflicts(earlier.sight, now.sight, registered.pose)
         if against > self._settings.conflicts:
             return None
-        tied = _between_sensors(UncertainPose(registered.pose, C), earlier, now)
-        return Loop(i, k, *tied, registered.inliers - against)
+        alone = self._alone(k, UncertainPose(registered.pose, C), reference)
+        return Loop(i, k, *_between_sensors(alone, earlier, now), registered.inliers - against)
+
+    def _alone(self, k: int, together: UncertainPose, reference: Surfels) -> UncertainPose:
+        """T_i_k of the scan of node k alone, by where what it and those before it saw together lies.
+
+        It was tied to these by steps that may be off, and stands off from what they saw by as much.
+        """
+        guess, C = together.compose(self._astray(k))
+        seen = self._keyframes[k].patches.near
+        registered = register(
+            reference, seen, guess, guess, information_of(C), self._match.reach, settled=True
+        )
+        return UncertainPose(registered.pose, information_of(registered.information) + self._settings.floor)
+
+    def _astray(self, k: int) -> UncertainPose:
+        """How far node k may stand off from where the graph has it, seen from a few nodes before; the pose is 0."""
+        pose, P = self._graph.relative(max(0, k - self._settings.before), k)
+        return UncertainPose(pose, np.zeros((3, 3))).relative(UncertainPose(pose, P))
 
     def _is_same(self, a: Loop, b: Loop) -> bool:
         """True if two places are one, known only vaguely (along a corridor)."""
