@@ -18,9 +18,8 @@ def noise_expected(scan: Scan, noise: SensorNoise) -> float:
         return 0.0
     step = ((np.roll(theta, -1) - np.roll(theta, 1)) % (2 * np.pi)) / 2
     slope = (np.roll(rho, -1) - np.roll(rho, 1)) / (2 * np.maximum(step, 1e-9))
-    with np.errstate(
-        over="ignore", invalid="ignore"
-    ):  # no number holds the squares of ranges that are absurd
+    # No number holds the squares of ranges that are absurd.
+    with np.errstate(over="ignore", invalid="ignore"):
         variances = noise.range_variances(rho) + (slope * noise.sigma_bearing) ** 2
         if noise.unevenness:
             variances = variances + _of_unevenness(rho, slope, step, noise)

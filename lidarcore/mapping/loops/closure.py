@@ -1,9 +1,9 @@
 """Loops: which ties to earlier places are believed.
 
-What the last keyframes saw together is registered on what those of an earlier pass saw together. A tie must lie in the
-chi-square gate of what the graph expects. Where the graph is too vague for that to exclude a wrong one, it waits until
-others along a stretch of the way agree with it [Olson, ICRA 2009; Mangelson et al., ICRA 2018], and is believed only if
-no rival that says something else has nearly as many that agree.
+What the last keyframes saw together is registered on what those of an earlier pass saw together, and the newest scan
+alone from there. A tie must lie in the chi-square gate of what the graph expects. Where the graph is too vague for that
+to exclude a wrong one, it waits until others along a stretch of the way agree with it [Olson, ICRA 2009; Mangelson et
+al., ICRA 2018], and is believed only if no rival that says something else has nearly as many that agree.
 """
 
 import numpy as np

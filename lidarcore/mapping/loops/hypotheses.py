@@ -96,7 +96,7 @@ class Hypotheses:
         return Loop(i, k, *_between_sensors(alone, earlier, now), registered.inliers - against)
 
     def _alone(self, k: int, together: UncertainPose, reference: Surfels) -> UncertainPose:
-        """T_i_k of the scan of node k alone, by where what it and those before it saw together lies.
+        """T_i_k as the scan of node k alone says, from where it and the scans before it lie together (T_i_k, too).
 
         It was tied to these by steps that may be off, and stands off from what they saw by as much.
         """
