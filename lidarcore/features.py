@@ -11,9 +11,9 @@ import numpy as np
 from lidarcore import tables
 from lidarcore.lines import Lines
 from lidarcore.lines.line import ABOUT_MEAN, ABOUT_TRUTH, normal_angle, to_second_order
-from lidarcore.noise_expected import noise_expected
 from lidarcore.rejections import Rejections
 from lidarcore.scan import Array, Ints, Scan
+from lidarcore.segmentation.noise_expected import noise_expected
 from lidarcore.settings import Covariance, ExtractionSettings
 from lidarcore.table_view import TableView
 

@@ -7,7 +7,7 @@ import pytest
 
 from lidarcore import ExtractionSettings, Scan, SensorNoise, extract
 from lidarcore.evaluation.calibration.noise_check import contradiction
-from lidarcore.noise_expected import noise_expected
+from lidarcore.segmentation.noise_expected import noise_expected
 from lidarcore.simulation.robot import SimulatedRobot
 from lidarcore.simulation.settings import SimulationSettings
 

@@ -112,7 +112,7 @@ def test_what_was_seen_just_before_is_a_place_too():
 
 
 def newest_after_a_bend(turned):
-    """How far (3,) a loop of a node has it off whose step is off by so many rad, and the squares of what it claims."""
+    """How far (3,) the loop of a node is off whose last step is off by so many rad, and the covariance it claims."""
     last = 76
     truth, graph, keyframes = newest_on_first(FURNISHED, 0.0, vague=last)
     poses = graph.poses.copy()

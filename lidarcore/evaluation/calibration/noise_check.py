@@ -6,7 +6,7 @@ import numpy as np
 
 from lidarcore.features import Features
 from lidarcore.noise import SensorNoise
-from lidarcore.noise_expected import noise_expected
+from lidarcore.segmentation.noise_expected import noise_expected
 
 SCANS = 20  # whose median speaks: one scan's estimate is off by a tenth or so
 AGREES = (1 / 1.5, 2.5)
